@@ -45,6 +45,7 @@ use crate::pass::shadow_map::ShadowMaps;
 use crate::pass::sum::{Sample, block_of, join};
 use crate::pass::tiles::tiles;
 use crate::pass::tonemap::{Counts, tonemap};
+use crate::pass::trace_photons::trace_photons;
 use crate::plan::{Ability, Architecture, Plan, Refused, Setting};
 use crate::prepare::{Original, Prepared};
 use crate::scene::Camera;
@@ -351,6 +352,8 @@ impl Renderer {
     pub fn step(&mut self, drawing: &mut Drawing) -> Result<()> {
         let ([index, band], count) = (drawing.next, drawing.count);
         self.set_band(band, index, count);
+        self.look(&drawing.view, index, count, band);
+        self.trace_photons(drawing)?;
         // A frame whose transparent fragments did not fit is drawn again with a larger buffer.
         loop {
             self.look(&drawing.view, index, count, band);
@@ -480,6 +483,20 @@ impl Renderer {
         let at = (index / self.halves()) % parts;
         let part = if parts > 1 { at.reverse_bits() >> (32 - parts.ilog2()) } else { 0 };
         self.scene.upload_band(Some(&Slice::new(band, band.part(part, parts))));
+    }
+
+    /// Traces photons of punctual lights and builds their map, another one for each sample and band: what one misses or
+    /// has too much of, others have.
+    fn trace_photons(&mut self, drawing: &mut Drawing) -> Result<()> {
+        let [index, band] = drawing.next;
+        let number = u64::from(self.settings.seed) << 32 | u64::from(index) << 8 | u64::from(band);
+        let Some(flight) = self.rays.photons.emit(&self.device, number)? else { return Ok(()) };
+        let mut frame = self.frame();
+        trace_photons(&mut frame, self.library(), &flight)?;
+        drawing.times.add(frame.finish()?);
+        self.rays.photons.land(&self.device, &flight)?;
+        self.sets = self.on_device().write(&self.device)?;
+        Ok(())
     }
 
     fn on_device(&self) -> OnDevice<'_> {
@@ -639,6 +656,12 @@ impl Renderer {
             self.shadow_maps.times.iter().map(|pass| PassPlan { name: pass.name.clone(), pipelines: Vec::new() });
         let mut passes: Vec<PassPlan> = done.collect();
         let drawing = Drawing::new(view, count);
+        if let Some(flight) = self.rays.photons.emit(&self.device, 0)? {
+            let mut frame = self.frame();
+            trace_photons(&mut frame, self.library(), &flight)?;
+            frame.compile_where_told()?;
+            passes.extend(frame.plan());
+        }
         for frame in [self.sample(count, 0)?, self.add(&drawing, 0)?, self.show(count, count)?] {
             frame.compile_where_told()?;
             passes.extend(frame.plan());

@@ -376,6 +376,27 @@ fn path_guiding_brings_its_tables() {
     .check();
 }
 
+/// Photons fly towards the hidden mirror, and none arrives there.
+#[test]
+fn caustics_bring_photons_and_their_map() {
+    let effect = "caustics of punctual lights";
+    let light = LightKind::Directional { direction: DVec3::NEG_Z };
+    let mut case = Case {
+        choices: &["indirect=path", "caustics=photons:16384"],
+        brings: &[
+            &["rays of photons", "landings of photons", "photon map"],
+            &["[photons]", "trace_photons", "path.photon_map"],
+        ],
+        ..Case::hidden(effect, NONE, metal(0.3), metal(0.0))
+    };
+    case.scenes.iter_mut().for_each(|made| made.light([1.0; 3], light));
+    case.check();
+    // Glass that bends nothing deflects nothing.
+    let mut air = ball(chalk(), Some(Material { ior: 1.0, specular: 1.0, roughness: 0.0, ..glass() }));
+    air.light([1.0; 3], light);
+    assert_eq!(state(&draw(&air.0, None, &["indirect=path", "caustics=photons:16384"]).plan, effect).0, "not needed");
+}
+
 #[test]
 fn mirrors_bring_rays_and_rays_what_they_may_meet() {
     Case {

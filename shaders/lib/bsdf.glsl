@@ -65,6 +65,11 @@ bool is_straight(Layers b) {
     return b.delta && (b.sheet || (b.solid && b.n1 == b.n2));
 }
 
+// Probability that a sample is of a lobe that scatters, not of a delta lobe.
+float scattering_share(Layers b) {
+    return b.shares.z + (b.delta ? 0.0 : b.shares.y + b.shares.w) + (b.coat_delta ? 0.0 : b.shares.x);
+}
+
 struct PathEval {
     vec3 f_cos;         // BSDF times |cosθ|, of all lobes but the delta ones
     float pdf;          // density with which bsdf_sample draws the direction, per solid angle
@@ -98,10 +103,11 @@ PathEval bsdf_evaluate(Bsdf b, vec3 l) {
 struct BsdfSample {
     vec3 direction;
     vec3 weight;   // of a delta lobe: BSDF times |cosθ| over probability
-    bool delta;
+    bool delta;    // of a delta lobe, or of weight 0
     bool through;  // the direction leaves behind the surface
     bool straight; // and is not deflected
     bool diffuse;  // sampled from the diffuse base layer
+    bool specular; // sampled from a delta lobe
 };
 
 // Importance sampling of the BSDF: `x` chooses the lobe, `u` the direction within it.
@@ -116,7 +122,7 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     bool delta = (coat ? b.coat_delta : b.delta) && !diffuse;
     vec3 h = event_half_vector(b, coat, u);
     vec3 mirrored = reflect_ray(-s.v, h).R;
-    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false, diffuse);
+    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false, diffuse, delta);
     // A delta lobe returns its weight, at the viewer's angle. For rough lobes the caller evaluates the whole BSDF instead.
     vec3 weight = b.f_base * (b.under * b.left);
     float share = b.shares.y;

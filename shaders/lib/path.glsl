@@ -8,9 +8,9 @@
 // Assumes: bvh space, metres; densities per solid angle; radiance divided by the square of the index of refraction.
 #ifndef PATH_GLSL
 #define PATH_GLSL
-#include "lib/bsdf.glsl"
 #include "lib/emitters.glsl"
-#include "lib/path_ray.glsl"
+#include "lib/path_vertex.glsl"
+#include "lib/photon_map.glsl"
 #include "lib/work_count.glsl"
 
 layout(constant) const bool EMISSIVE_LIGHTS = false; // emissive surfaces light the scene; otherwise they are only seen
@@ -50,20 +50,6 @@ vec3 finite_or_zero(vec3 light, uvec2 pixel, uint material, uint surface) {
         }
     }
     return good ? light : vec3(0.0);
-}
-
-// A hit and its boundary, for a ray that may pass undeflected.
-struct Interaction {
-    HitSurface hit;
-    Boundary boundary;
-};
-
-Interaction interaction_at(HitPoint point, uvec4 media, vec3 direction) {
-    Interaction r;
-    r.hit = hit_surface(point, direction, 0.0);
-    r.hit.s.media = media;
-    r.boundary = boundary_at(r.hit, media, direction);
-    return r;
 }
 
 // End of the shadow ray: four roundings before the light, so that a surface touching the light does not occlude it.
@@ -145,30 +131,22 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
 
 // Shades one path vertex. Returns the radiance gathered there; also gives the shadow ray still to be traced, and the
 // continued path p.
-// Steps: 1. the interaction; 2. next event estimation; light found by the path itself: 3a. the environment, 3b. emission
-// of the surface; 4. the BSDF sample, and the BSDF towards all light samples and along the path, in one loop; 5. further
-// light samples, in that loop; 6. the continued path; 7. Russian roulette.
+// Steps: 1. the vertex; 2. next event estimation; light found by the path itself: 3a. the environment, 3b. emission
+// of the surface; 4. the BSDF sample, and the BSDF towards all light samples, a photon, and along the path, in one loop;
+// 5. further light samples, in that loop; 6. the continued path; 7. Russian roulette.
 vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRay shadow_ray) {
-    // 1. The interaction: absorption on the way, hit, boundary, BSDF.
+    // 1. The vertex: absorption on the way, hit, boundary, BSDF.
     shadow_ray = ShadowRay(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.source_face, p.media, vec3(0.0));
     vec3 gathered = vec3(0.0);
-    bool at_surface = found.triangle != NO_TRIANGLE;
     uint vertices_before = p.state & PATH_SURFACES;
-    uint medium = present_medium(p.media);
-    if (ABSORPTION == ABSORPTION_PATH && medium != 0) p.throughput *= absorbed(medium, p.origin, p.direction, at_surface ? found.t : 0.0);
-    uint leaf = at_surface ? found.triangle : 0u;
-    HitPoint point = hit_point_of(Hit(found.t, leaf, found.u, found.v), p.origin, p.direction);
-    Interaction interaction = interaction_at(point, p.media, p.direction);
-    HitSurface hit = interaction.hit;
-    Bsdf bsdf = bsdf_at(hit, interaction.boundary);
-    if (PATH_GUIDING) enable_guiding(bsdf);
-    Layers b = bsdf.layers;
     uvec2 event = dimension_words(pixel, vertices_before, DIMENSION_EVENT);
-    float x = unit_float(event.x);
-    // Single-sided surfaces are invisible from behind to the eye, as with back-face culling.
-    bool unseen = (p.state & PATH_UNSCATTERED) != 0 && (hit_material(leaf) & ONE_SIDED_TRIANGLE) != 0 && !hit.front && !interaction.boundary.solid;
-    bool passed_by = interaction.boundary.suppressed_by_priority || unseen || x >= hit.coverage;
-    x = min(x / max(hit.coverage, 1e-6), 0.999999940395355);
+    PathVertex vertex = path_vertex_at(p, found, event.x);
+    bool at_surface = vertex.at_surface;
+    bool passed_by = vertex.passed_by;
+    Interaction interaction = vertex.interaction;
+    HitSurface hit = interaction.hit;
+    if (PATH_GUIDING) enable_guiding(vertex.bsdf);
+    Layers b = vertex.bsdf.layers;
 
     // 2. Next event estimation: a light sample.
     LightSample light = LightSample(p.direction, -1.0, vec3(0.0), 0.0);
@@ -196,12 +174,12 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * (CLEARCOAT ? under_coat(hit.s) : 1.0);
         // Single-sided surfaces emit on their front alone.
         bool shows = EMISSIVE_LIGHTS || (p.state & PATH_NON_SPECULAR) == 0;
-        shows = shows && (hit.s.unlit || hit.front || (hit_material(leaf) & ONE_SIDED_TRIANGLE) == 0);
+        shows = shows && (hit.s.unlit || hit.front || (hit_material(vertex.leaf) & ONE_SIDED_TRIANGLE) == 0);
         float w = 1.0;
         if (EMISSIVE_TRIANGLES) {
             float r = p.distance_since_vertex + found.t;
             float cos_light = max(abs(dot(hit.n, p.direction)), 1e-9);
-            float drawn = density_per_solid_angle(light_pdf_area(leaf), r * r, cos_light);
+            float drawn = density_per_solid_angle(light_pdf_area(vertex.leaf), r * r, cos_light);
             w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, float(LIGHT_SAMPLES) * drawn) : 1.0;
         }
         gathered = shows ? p.throughput * emits * w : vec3(0.0);
@@ -216,26 +194,36 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         ends = true;
     }
     uvec2 words = dimension_words(pixel, vertices_before, DIMENSION_DIRECTION);
-    BsdfSample drawn = bsdf_sample(bsdf, x, vec2(unit_float(words.x), unit_float(words.y)));
-    // First towards the light samples, then along the path, in a loop: the code exists once.
+    BsdfSample drawn = bsdf_sample(vertex.bsdf, vertex.x, vec2(unit_float(words.x), unit_float(words.y)));
+    PhotonSample photon = PhotonSample(p.direction, vec3(0.0));
+    if (PHOTON_MAP) {
+        float chooses = unit_float(dimension_words(pixel, vertices_before + 1, DIMENSION_PHOTON).x);
+        photon = sample_photons(hit.s.p_bvh, hit.n, chooses, scatters && alive);
+    }
+    // First towards the light samples, then to a photon, at last along the path, in a loop: the code exists once.
     PathEval towards_light = PathEval(vec3(0.0), 0.0, 0.0);
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
-    LightSample other = light;
-    for (uint i = 0; i <= LIGHT_SAMPLES; i++) {
-        bool along_path = i == LIGHT_SAMPLES;
-        if (LIGHT_SAMPLES > 1 && i > 0 && !along_path) {
+    LightSample sampled = light;
+    uint last = LIGHT_SAMPLES + (PHOTON_MAP ? 1u : 0u);
+    for (uint i = 0; i <= last; i++) {
+        bool further = LIGHT_SAMPLES > 1 && i > 0 && i < LIGHT_SAMPLES;
+        vec3 towards = i == last ? drawn.direction : normalize(sampled.to_light);
+        if (further) {
             // 5. A further light sample; its shadow ray is traced below.
-            other = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
-            if (SAMPLED_ENVIRONMENT && other.pdf > 0.0 && other.t_max == LARGEST) {
-                bool ahead = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && dot(hit.n, other.to_light) < 0.0 && !shines_through(b);
-                other.arriving *= ahead ? background_radiance(other.to_light) : environment_radiance(other.to_light);
+            sampled = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
+            if (SAMPLED_ENVIRONMENT && sampled.pdf > 0.0 && sampled.t_max == LARGEST) {
+                bool ahead = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && dot(hit.n, sampled.to_light) < 0.0 && !shines_through(b);
+                sampled.arriving *= ahead ? background_radiance(sampled.to_light) : environment_radiance(sampled.to_light);
             }
+            towards = normalize(sampled.to_light);
         }
-        PathEval now = bsdf_evaluate(bsdf, along_path ? drawn.direction : normalize(other.to_light));
+        if (PHOTON_MAP && i == LIGHT_SAMPLES) towards = photon.to_light;
+        PathEval now = bsdf_evaluate(vertex.bsdf, towards);
         if (i == 0) towards_light = now;
         on_path = now;
-        if (LIGHT_SAMPLES > 1 && i > 0 && !along_path) {
-            ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, other, now);
+        if (PHOTON_MAP && i == LIGHT_SAMPLES && largest(photon.arriving) > 0.0) gathered += p.throughput * now.f_cos * photon.arriving;
+        if (further) {
+            ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, sampled, now);
             one.t_max = alive ? one.t_max : -1.0;
             shadow_rays += one.t_max > 0.0 ? 1u : 0u;
             vec3 arrives = arriving(one);
@@ -248,20 +236,12 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     }
     // 6. The continued path: throughput, start of the next ray, media.
     vec3 weight = drawn.delta ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);
-    bool on_right_side = drawn.through == (dot(drawn.direction, hit.n) < 0.0);
-    weight = passed_by ? vec3(1.0) : on_right_side || drawn.straight ? weight : vec3(0.0);
-    // The shadow ray passes surfaces of class FILTER only, so only those start no new vertex for MIS.
-    bool unscattered = (passed_by || drawn.straight) && hit_class(leaf) == FILTER;
-    p.throughput *= weight;
+    bool unscattered = is_unscattered(vertex, drawn);
+    bool behind = passed_by || drawn.through;
+    p.throughput *= weight_of(vertex, drawn, weight);
     p.distance_since_vertex = escaped ? background_share : unscattered ? p.distance_since_vertex + found.t : 0.0;
     p.pdf = unscattered ? p.pdf : passed_by || drawn.delta ? 0.0 : on_path.pdf;
-    bool behind = passed_by || drawn.through;
-    bool into = passed_by ? interaction.boundary.suppressed_by_priority : drawn.through && interaction.boundary.solid;
-    p.origin = behind ? ray_origin(hit.s.p_bvh, interaction.boundary.touches_opaque ? hit.n : -hit.n, vec3(0.0)) : front_origin;
-    p.t_min = interaction.boundary.touches_opaque && passed_by ? interaction.boundary.opaque_at : 0.0;
-    p.direction = passed_by ? p.direction : drawn.direction;
-    p.source_face = hit.s.face;
-    p.media = into ? interaction.boundary.media_out : p.media;
+    leave(p, vertex, drawn, front_origin);
     unmatched_exits += at_surface && interaction.boundary.unmatched_exit ? 1u : 0u;
     uint flags = p.state & (PATH_TRANSPARENT_SO_FAR | PATH_UNSCATTERED | PATH_NON_SPECULAR);
     // Behind a surface that transmits diffusely, light samples see the environment: so do all directions but straight ones.

@@ -36,7 +36,8 @@ const uint DIMENSION_PAIRS = 4;
 const uint DIMENSION_EVENT = 0;
 const uint DIMENSION_DIRECTION = 1;
 const uint DIMENSION_LIGHT = 2;
-const uint DIMENSION_PIXEL = 3;
+const uint DIMENSION_PIXEL = 3;  // of the camera ray alone, before the first vertex
+const uint DIMENSION_PHOTON = 3; // of a vertex's successor: its number is one more
 
 uvec2 dimension_words(uvec2 pixel, uint surface, uint draw) {
     return random_words(pixel, surface * DIMENSION_PAIRS + draw, trace_terms.seed, trace_terms.sample_index);

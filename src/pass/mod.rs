@@ -26,4 +26,5 @@ pub mod shadow_map;
 pub mod sum;
 pub mod tiles;
 pub mod tonemap;
+pub mod trace_photons;
 pub mod trace_rays;

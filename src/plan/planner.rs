@@ -48,6 +48,7 @@ impl Plan {
         let images = planner.mirror_images(&transmission);
         let paths = planner.paths();
         let lights = planner.lights(paths);
+        let paths = planner.caustics(paths, &lights);
         let rays = planner.rays(&transmission, &images, &lights);
         let (bands, disperses) = planner.wavelengths(&transmission);
         let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && paths.is_none();
@@ -370,7 +371,24 @@ impl Planner<'_> {
             knobs.guiding.choice().allows(knobs.guiding != Guiding::Off),
             cause,
         );
-        paths.then_some(Paths { emitting, shaped, guided })
+        paths.then_some(Paths { emitting, shaped, guided, photons: 0 })
+    }
+
+    /// Adds the photons of punctual lights to path tracing: no path reaches such a light by way of a smooth surface.
+    fn caustics(&mut self, paths: Option<Paths>, lights: &Lights) -> Option<Paths> {
+        let Self { surfaces, decisions, knobs, .. } = self;
+        let deflects = |m: &Material| is_smooth(m) && (surfaces::mirrors(m) || m.ior != 1.0 || m.clearcoat > 0.0);
+        let cause = match (paths, lights.directional + lights.local) {
+            (None, _) => Cause::against("path tracing is off"),
+            (_, 0) => Cause::against("no punctual light shines"),
+            _ => surfaces.cause(deflects, |m| {
+                let does = if m.transmission > 0.0 { "refracts or reflects" } else { "reflects" };
+                format!("{does} the light of punctual lights specularly")
+            }),
+        };
+        let photons = knobs.caustics.photons();
+        let kept = decisions.decide_with(EffectId::Caustics, knobs.caustics.choice().allows(photons > 0), cause);
+        paths.map(|paths| Paths { photons: if kept { photons } else { 0 }, ..paths })
     }
 
     /// Number of bands of wavelengths, and whether dispersion splits rays by wavelength.

@@ -150,6 +150,8 @@ pub struct Paths {
     pub shaped: bool,
     /// Path guiding with photons.
     pub guided: bool,
+    /// Photons of each sample for the photon map of punctual lights; 0 without one.
+    pub photons: u32,
 }
 
 /// Ray marching through grids of σ.

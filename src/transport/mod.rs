@@ -1,5 +1,5 @@
-//! The host's part of light transport: BVH, light sampling tables, photons for path guiding, and the rays of one picked
-//! pixel.
+//! The host's part of light transport: BVH, light sampling tables, photons for path guiding and for the photon map, and
+//! the rays of one picked pixel.
 //!
 //! Read pbrt (4th ed.), chapters 7 and 12 to 14. This module uses scenes and no Vulkan; [`crate::upload`] uploads its
 //! results.
@@ -12,6 +12,7 @@ pub mod events;
 pub mod layers;
 mod line;
 pub mod photon_guiding;
+pub mod photon_map;
 mod ploc;
 pub mod sight;
 pub mod sky_directions;

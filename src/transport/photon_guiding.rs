@@ -101,9 +101,13 @@ struct PhotonWorld<'a> {
 }
 
 /// Uniform random numbers in [0, 1) (splitmix64; Steele, Lea and Flood 2014).
-struct PhotonRandom(u64);
+pub(super) struct PhotonRandom(u64);
 
 impl PhotonRandom {
+    pub(super) fn new(number: u64) -> Self {
+        Self(number)
+    }
+
     fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -111,7 +115,7 @@ impl PhotonRandom {
         z ^ (z >> 31)
     }
 
-    fn unit(&mut self) -> f64 {
+    pub(super) fn unit(&mut self) -> f64 {
         (self.word() >> 11) as f64 / 9_007_199_254_740_992.0
     }
 
@@ -170,7 +174,7 @@ impl PhotonWorld<'_> {
     /// caustics are small and bright, and light other surfaces.
     fn follow(&self, number: u64) -> impl Iterator<Item = Photon> {
         let mut found = [None; 2];
-        let mut random = PhotonRandom(number);
+        let mut random = PhotonRandom::new(number);
         let mut next = self.start(&mut random);
         let mut from = None;
         for _ in 0..MOST_SURFACES {
@@ -229,7 +233,7 @@ impl PhotonWorld<'_> {
 }
 
 /// Whether an instance only scatters: it is opaque, and no layer has a specular lobe.
-fn is_diffuse(scene: &Scene, solids: &Solids, instance: usize) -> bool {
+pub(super) fn is_diffuse(scene: &Scene, solids: &Solids, instance: usize) -> bool {
     let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
     !solids.solid[instance] && coverage(material) == Some(1.0) && !is_smooth(material)
 }

@@ -6,6 +6,7 @@
 pub mod emitters;
 pub mod environment;
 pub mod path_guiding;
+pub mod photon_map;
 pub mod rays;
 pub mod scene;
 pub mod shared;

@@ -15,11 +15,12 @@ use serde::Serialize;
 
 use super::emitters::EmittersOnDevice;
 use super::path_guiding::GuidingOnDevice;
+use super::photon_map::PhotonsOnDevice;
 use super::scene::{BENT, cofactors as cofactors_of, medium, texture_bits};
 use super::table::{pack_half_2x16, upload};
 use super::view::View;
 use crate::gpu::{Buffer, Device, Frame, NOTHING, Place};
-use crate::plan::{Architecture, Plan, Rays};
+use crate::plan::{Architecture, Paths, Plan, Rays};
 use crate::prepare::{Hierarchy, Prepared, ray_offset};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene, Shared};
@@ -32,6 +33,7 @@ use crate::share::{
 use crate::transport::bvh::{Format, Order, Triangle};
 use crate::transport::emitters::{EmitterSource, Emitters};
 use crate::transport::photon_guiding::PhotonGuiding;
+use crate::transport::photon_map::PhotonEmission;
 
 /// Largest size of the eight octant-ordered node lists in bytes, some two million nodes of 16 bytes: they are eight
 /// copies of the BVH.
@@ -117,6 +119,8 @@ pub struct RaysOnDevice {
     pub emitters: EmittersOnDevice,
     /// Guiding distribution of path guiding.
     pub guiding: GuidingOnDevice,
+    /// Photons of punctual lights.
+    pub photons: PhotonsOnDevice,
     /// [`TraceTerms`].
     pub terms: Buffer,
     /// [`WorkCounts`].
@@ -254,6 +258,13 @@ impl RaysOnDevice {
                 true => GuidingOnDevice::new(device, &PhotonGuiding::of(scene, solids, bvh, emitters))?,
                 false => GuidingOnDevice::none(device)?,
             },
+            photons: match plan.paths {
+                Some(Paths { photons, shaped, .. }) if photons > 0 => {
+                    let around = |p_world| media_around(scene, solids, p_world);
+                    PhotonsOnDevice::new(device, PhotonEmission::new((scene, solids, bvh), shaped, photons, around))?
+                }
+                _ => PhotonsOnDevice::none(device)?,
+            },
             leaf_places: upload(device, "leaf places", &leaf_places, None)?,
             fixed,
             anchor: bvh.anchor,
@@ -275,6 +286,7 @@ impl RaysOnDevice {
             leaf_places: Buffer::new(device, NOTHING, 0, Place::Device)?,
             emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
             guiding: GuidingOnDevice::none(device)?,
+            photons: PhotonsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             snap_pixels: device.snap_pixels(),
             counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
@@ -302,14 +314,8 @@ impl RaysOnDevice {
     /// Updates the constants of rays for one sample of a view.
     pub fn set_view(&mut self, view: &View, sample_index: u32, samples: u32, seed: u32) {
         let eye = view.eye - self.anchor;
-        let mut camera_media = [0; 4];
         if sample_index == 0 {
-            for &instance in &media_at(&self.bodies, &self.solids, view.eye) {
-                let material = self.solids.medium[self.bodies.meshes[self.bodies.instances[instance].mesh].material];
-                camera_media.copy_within(0..3, 1);
-                camera_media[0] = medium(&self.bodies.materials[material], material);
-            }
-            self.fixed.camera_media = camera_media;
+            self.fixed.camera_media = media_around(&self.bodies, &self.solids, view.eye);
         }
         let terms = TraceTerms {
             bvh_from_rel: eye.as_vec3().to_array(),
@@ -356,6 +362,17 @@ impl RaysOnDevice {
     pub fn reset<'a>(&'a self, frame: &mut Frame<'a>) {
         frame.fill("reset work counts", &self.counts, 0);
     }
+}
+
+/// The media around a point of the world, as entries of shaders/lib/media.glsl.
+fn media_around(scene: &Scene, solids: &Solids, p_world: DVec3) -> [u32; 4] {
+    let mut media = [0; 4];
+    for &instance in &media_at(scene, solids, p_world) {
+        let material = solids.medium[scene.meshes[scene.instances[instance].mesh].material];
+        media.copy_within(0..3, 1);
+        media[0] = medium(&scene.materials[material], material);
+    }
+    media
 }
 
 /// Whether shadow rays may pass through an instance's surface; in path tracing only without refraction.

@@ -57,12 +57,13 @@ impl<'a> OnDevice<'a> {
         .concat()
     }
 
-    /// Entries of the descriptor set `paths`: light sampling and path guiding.
+    /// Entries of the descriptor set `paths`: light sampling, path guiding, photons.
     fn path_entries(&self) -> Vec<(u32, Resource<'a>)> {
-        let RaysOnDevice { emitters, guiding, .. } = self.rays;
+        let RaysOnDevice { emitters, guiding, photons, .. } = self.rays;
         [
             lib::emitters::Paths { emitters: &emitters.table, environment_cdf: &emitters.sky }.entries(),
             lib::path_guiding::Paths { guiding_cells: &guiding.cells, guiding_spheres: &guiding.spheres }.entries(),
+            lib::photon_map::Paths { photon_map: &photons.map }.entries(),
         ]
         .concat()
     }
@@ -147,6 +148,7 @@ impl<'a> OnDevice<'a> {
                 false => lib::loops::Constants { loop_budget: u32::MAX },
             },
             path: lib::path::Constants { emissive_lights: paths.emitting, light_samples: knobs.lights.places() },
+            photon_map: lib::photon_map::Constants { photon_map: paths.photons > 0 },
             path_state: lib::path_state::Constants {
                 keeps_media: with.transmissive,
                 keeps_t_min: rays.constants.touching,

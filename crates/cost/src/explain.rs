@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
-use etalon::plan::rungs::{Absorption, Colour, Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
+use etalon::plan::rungs::{Absorption, Caustics, Colour, Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
 use etalon::plan::{Choice, Effect, EffectId, EffectState, ForcedEffects, Knob, Knobs, Model};
 use etalon::prepare::Original;
 use etalon::scene::Camera;
@@ -183,8 +183,9 @@ fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
         EffectId::PathTracing => paths.into(),
         EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
         EffectId::EmissiveLights | EffectId::AreaLights | EffectId::PathGuiding => [&paths[..], &by_lights].concat(),
+        EffectId::Caustics => [&paths[..], &[Caustics::Photons16384.choice()]].concat(),
         _ if dropped_by == Indirect::Path.choice() => {
-            vec![Indirect::Ambient.choice(), Lights::Points.choice(), Guiding::Off.choice()]
+            vec![Indirect::Ambient.choice(), Lights::Points.choice(), Guiding::Off.choice(), Caustics::Off.choice()]
         }
         _ => {
             let recursive = Knobs::of(Model::Recursive);

@@ -7,7 +7,7 @@ pub mod rungs;
 
 use super::refused::{Refused, Setting};
 use anyhow::Result;
-use rungs::{Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
+use rungs::{Caustics, Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
 pub use rungs::{KNOBS, Knob, Knobs, Model};
 
 impl Knob {
@@ -95,7 +95,7 @@ impl Knobs {
     /// # Errors
     /// One sentence with both and the nearest choice.
     pub fn check(&self) -> Result<()> {
-        let Self { shadows, reflection, refraction, indirect, lights, guiding, .. } = *self;
+        let Self { shadows, reflection, refraction, indirect, lights, guiding, caustics, .. } = *self;
         if indirect == Indirect::Path {
             let other = [
                 (shadows != Shadows::Ray).then(|| (shadows.to_string(), Shadows::Ray.to_string())),
@@ -117,6 +117,11 @@ impl Knobs {
             return Err(refused(format!(
                 "{guiding} contradicts {indirect}: only paths are guided; the nearest choice is indirect=path, or \
                  guiding=off"
+            )));
+        } else if caustics != Caustics::Off {
+            return Err(refused(format!(
+                "{caustics} contradicts {indirect}: only paths look up photons; the nearest choice is indirect=path, or \
+                 caustics=off"
             )));
         }
         Ok(())

@@ -56,6 +56,8 @@ effects! {
         "a sphere, disk or rectangle light, with `lights=area:N` and path tracing" => "code",
     PathGuiding = "path guiding":
         "a smooth surface that light reaches and that sends it to a diffuse one, with `guiding=photons` and path tracing" => "photons, a grid of cells with bounding spheres; code",
+    Caustics = "caustics of punctual lights":
+        "a smooth surface in the light of a punctual light, with `caustics=photons:N` and path tracing" => "photons, a photon map; code",
     SpectralRendering = "spectral rendering":
         "something coloured, with `colour=spectral:N`" => "a frame for each band of wavelengths, a table of the band; code where colours are read",
     Dispersion = "dispersion":
@@ -95,6 +97,7 @@ knobs! {
     indirect: Indirect,
     lights: Lights,
     guiding: Guiding,
+    caustics: Caustics,
     samples: Samples,
     colour: Colour,
     upsampling: Upsampling,
@@ -452,6 +455,38 @@ knob! {
     about: "path guiding: BSDF sampling alone, or mixed with directions from which photons came by specular surfaces; the same mean",
 }
 
+macro_rules! caustics_about {
+    ($photons:literal) => {
+        concat!($photons, " photons for each sample of a pixel bring the light, blurred between them.")
+    };
+}
+
+knob! {
+    Caustics = "caustics" {
+        /// Where a smooth surface bends or mirrors the light of a point, it does not arrive: shadows behind glass are dark.
+        Off = "off",
+        #[doc = caustics_about!("16 thousand")]
+        Photons16384 = "photons:16384",
+        #[doc = caustics_about!("65 thousand")]
+        Photons65536 = "photons:65536",
+        #[doc = caustics_about!("262 thousand")]
+        Photons262144 = "photons:262144",
+    }
+    presets: [Off, Off, Photons16384],
+    exact: Photons262144,
+    lecture: ["R6"],
+    effects: [Caustics],
+    about: "light of punctual lights by way of smooth surfaces: none, or from a photon map of N photons in each sample",
+}
+
+impl Caustics {
+    /// Photons of each sample that are traced from punctual lights; 0 without a photon map.
+    #[must_use]
+    pub fn photons(self) -> u32 {
+        number(self.name(), "photons:").unwrap_or(0)
+    }
+}
+
 macro_rules! samples_about {
     ($samples:literal) => {
         concat!($samples, " samples per pixel: the noise falls with the square root of their number.")
@@ -622,6 +657,7 @@ mod tests {
         assert_eq!(Lights::RUNGS.iter().map(|rung| rung.places()).collect::<Vec<_>>(), [1, 1, 4, 16]);
         assert_eq!(Colour::RUNGS.iter().map(|rung| rung.bands()).collect::<Vec<_>>(), [0, 8, 16, 32]);
         assert_eq!(Guiding::Photons.to_string(), "guiding=photons");
+        assert_eq!(Caustics::RUNGS.iter().map(|rung| rung.photons()).collect::<Vec<_>>(), [0, 16384, 65536, 262_144]);
     }
 
     #[test]
