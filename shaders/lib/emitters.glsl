@@ -1,12 +1,15 @@
-// Light sampling by power: punctual lights, emissive triangles and the environment, with their densities (lecture R2–R4).
+// Light sampling: punctual lights, emissive triangles and the environment, with their densities (lecture R2–R4).
 // One emitter is chosen by a CDF over powers, then a point or direction on it. Each CDF is in 32-bit fixed point: a random
 // 32-bit word is looked up by binary search, and its position inside the bin becomes the next random number. The
 // environment has a marginal CDF over rows and one conditional CDF over columns for each row.
-// Where to read: pbrt 4, section 12.6 (light sampling) and appendix A (piecewise constant distributions);
-// docs/decisions/paths.md.
+// With the light hierarchy the emitters that have a place share the last bin. The descent from its root divides the bin
+// between two children in proportion to their importance at the shaded point, again and again.
+// Where to read: pbrt 4, section 12.6 (light sampling) and appendix A (piecewise constant distributions); Conty Estevez and
+// Kulla 2018 (light hierarchy); docs/decisions/paths.md.
 // Assumes: points in bvh space, metres; densities per solid angle.
 #ifndef EMITTERS_GLSL
 #define EMITTERS_GLSL
+#include "lib/encode.glsl"
 #include "lib/environment.glsl"
 #include "lib/hit.glsl"
 #include "lib/punctual.glsl"
@@ -19,12 +22,18 @@ layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some emitter is a li
 layout(constant) const bool AREA_EMITTERS = false;     // some light of the table is an analytic area light
 layout(constant) const bool EMISSIVE_TRIANGLES = false;  // some emitter is an emissive triangle
 layout(constant) const bool SAMPLED_ENVIRONMENT = false;        // the environment is an emitter
+layout(constant) const bool LIGHT_HIERARCHY = false;     // emitters with a place are chosen by their importance
+layout(constant) const uint LIGHT_NODES = 0;             // texel of the hierarchy's root, behind the emitters
 layout(constant) const uint CDF_COLUMNS = 0;             // columns of the environment's CDF
 layout(constant) const uint CDF_ROWS = 0;
 layout(constant) const uint CDF_SEARCH_STEPS = 0;               // binary-search steps in a row, or over the rows
 
 layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;
 // @texels Emitter emitter_at(emitters)
+uvec4 light_node_texel(uint index, int texel) {
+    return imageLoad(emitters, int(LIGHT_NODES + 2u * index) + texel);
+}
+// @texels LightNode light_node_at(light_node_texel)
 // Lower ends of the bins: the marginal CDF over rows; then, row by row, the conditional CDF over columns.
 layout(paths, r32ui) readonly uniform uimageBuffer environment_cdf;
 
@@ -126,9 +135,59 @@ vec3 emission_at(uint triangle, float u, float v) {
     return radiance;
 }
 
-// Density per area of light sampling on a triangle; 0 where the triangle is no emitter.
-float light_pdf_area(uint triangle) {
-    return triangle_at(triangle).picked;
+float node_importance(LightNode node, vec3 p) {
+    vec2 cosines = unpackHalf2x16(node.cosines);
+    bool two_sided = (node.link & LIGHT_TWO_SIDED) != 0;
+    return light_importance(p - node.centre, node.radius, unit_from_octahedral(unpackSnorm2x16(node.axis)), cosines.x, cosines.y, two_sided, node.intensity);
+}
+
+struct HierarchyChoice {
+    uint emitter;
+    uint first; // its bin in the CDF, a part of the bin of the hierarchy
+    uint size;  // 0: no light from the hierarchy reaches the point
+};
+
+// Descends the light hierarchy to the emitter of a random word; where `trail` is not 0, to the emitter at its end. The bins
+// of both are the same function of the point, so light sampling and the density of a triangle that a path hits agree.
+HierarchyChoice descend_light_hierarchy(vec3 p, uint word, uint trail, bool wanted) {
+    bool follows = trail != 0;
+    HierarchyChoice r;
+    r.first = emitter_at(EMITTERS - 1).first;
+    // Where the hierarchy has all words, the last one counts as outside: sizes fit 32 bits.
+    r.size = r.first == 0u ? 0xffffffffu : 0u - r.first;
+    uint link = wanted ? light_node_at(0).link : LIGHT_LEAF;
+    // At most 31 steps: src/transport/light_hierarchy.rs, MOST_DEPTH.
+    while ((link & LIGHT_LEAF) == 0 && r.size > 0) {
+        LightNode one = light_node_at(link & LIGHT_INDEX);
+        LightNode other = light_node_at((link & LIGHT_INDEX) + 1u);
+        float of_one = node_importance(one, p);
+        float of_other = node_importance(other, p);
+        // A child that may light the point keeps at least one word.
+        float share = of_one / max(of_one + of_other, 1e-37);
+        uint split = max(uint(min(share * float(r.size), 4294967040.0)), of_one > 0.0 ? 1u : 0u);
+        uint of_first = of_other > 0.0 ? min(split, r.size - 1u) : of_one > 0.0 ? r.size : 0u;
+        bool second = follows ? (trail & 1u) != 0 : word - r.first >= of_first;
+        r.first += second ? of_first : 0u;
+        r.size = second ? (of_other > 0.0 ? r.size - of_first : 0u) : of_first;
+        link = second ? other.link : one.link;
+        trail >>= 1;
+    }
+    r.emitter = link & LIGHT_INDEX;
+    return r;
+}
+
+// Density per area of light sampling on a triangle, as seen from a point; 0 where the triangle is no emitter.
+float light_pdf_area(uint triangle, vec3 from, bool wanted) {
+    uint picked = triangle_at(triangle).picked;
+    float pdf = uintBitsToFloat(picked);
+    if (LIGHT_HIERARCHY) {
+        bool is_emitter = wanted && picked != 0;
+        HierarchyChoice choice = descend_light_hierarchy(from, 0, picked, is_emitter);
+        vec3 a, ab, ac;
+        vec3 doubled = doubled_area_of(triangle, a, ab, ac);
+        pdf = is_emitter && choice.size > 0 ? bin_probability(choice.first, choice.first + choice.size) * 2.0 / vector_length(doubled) : 0.0;
+    }
+    return pdf;
 }
 
 // Draws one light sample for a point at `origin` in bvh space. For the environment `arriving` is 1 over the density: the
@@ -146,6 +205,16 @@ LightSample sample_light(vec3 origin, uvec2 words) {
     uint next_first = found + 1 < EMITTERS ? emitter_at(found + 1).first : 0u;
     float probability = emitter.probability;
     float x = remapped_in_bin(words.x, emitter.first, next_first);
+    if (LIGHT_HIERARCHY) {
+        bool by_place = found == EMITTERS - 1;
+        HierarchyChoice choice = descend_light_hierarchy(origin, words.x, 0, by_place);
+        if (by_place) {
+            emitter = emitter_at(choice.emitter);
+            emitter.kind = choice.size > 0 ? emitter.kind : EMITTER_NONE;
+            probability = bin_probability(choice.first, choice.first + choice.size);
+            x = remapped_in_bin(words.x, choice.first, choice.first + choice.size);
+        }
+    }
     uint kind = emitter.kind & EMITTER_KIND;
     // 2a. A punctual light, or a point on an analytic area light.
     if (PUNCTUAL_EMITTERS) {

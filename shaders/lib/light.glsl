@@ -141,6 +141,34 @@ float ball_reach(float distance2, float radius, float cos_theta, float sin2_thet
     return max(sqrt(distance2) * cos_theta - sqrt(max(radius * radius - distance2 * sin2_theta, 0.0)), 1e-6 * sqrt(distance2));
 }
 
+// Cosine and sine of an angle less another, both in [0, π]; of 0 where the other is larger.
+vec2 angle_beyond(vec2 angle, vec2 other) {
+    bool less = angle.x > other.x;
+    return less ? vec2(1.0, 0.0) : vec2(angle.x * other.x + angle.y * other.y, angle.y * other.x - angle.x * other.y);
+}
+
+// Cosine and sine of an angle in [0, π].
+vec2 angle_of(float cosine) {
+    return vec2(cosine, sqrt(max(1.0 - cosine * cosine, 0.0)));
+}
+
+// @eq R4: I cos⁺θ'/max(d², r²), θ' = max(θ − θ_o − θ_b, 0), sinθ_b = r/d; 0 where θ' > θ_e; I/r² where d ≤ r
+// @out importance
+// Importance of a node of the light hierarchy at a point: about the largest irradiance that its emitters can give. They lie
+// in a sphere of radius r, from whose centre the point is seen in the direction `to_point`, of length d, at θ from `axis`.
+// Their axes are within θ_o of it, and each emits up to θ_e from its own. θ_b is the half angle of the sphere as the point
+// sees it, and θ' is then the smallest angle between the axis of any emitter and the point (Conty Estevez and Kulla 2018).
+float light_importance(vec3 to_point, float radius, vec3 axis, float cos_o, float cos_e, bool two_sided, float intensity) {
+    float d2 = dot(to_point, to_point);
+    float r2 = max(radius * radius, LIGHT_RADIUS * LIGHT_RADIUS);
+    float along = dot(axis, to_point) * inversesqrt(max(d2, 1e-30));
+    vec2 theta = angle_of(clamp(two_sided ? abs(along) : along, -1.0, 1.0));
+    float sin2_b = min(r2 / max(d2, r2), 1.0);
+    vec2 sphere = vec2(sqrt(1.0 - sin2_b), sqrt(sin2_b));
+    float cosine = d2 <= r2 ? 1.0 : angle_beyond(angle_beyond(theta, angle_of(cos_o)), sphere).x;
+    return cosine < cos_e ? 0.0 : intensity * max(cosine, 0.0) / max(d2, r2);
+}
+
 // @eq R2: p(ω) = p(A) r²/cosθ
 // @out pdf
 // Converts a density per area to a density per solid angle, for a point at distance r whose normal is at θ to the

@@ -179,7 +179,9 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         if (EMISSIVE_TRIANGLES) {
             float r = p.distance_since_vertex + found.t;
             float cos_light = max(abs(dot(hit.n, p.direction)), 1e-9);
-            float drawn = density_per_solid_angle(light_pdf_area(vertex.leaf), r * r, cos_light);
+            // The last vertex for MIS lies straight behind: what the path has met since did not deflect it.
+            vec3 last_vertex = p.origin - p.direction * p.distance_since_vertex;
+            float drawn = density_per_solid_angle(light_pdf_area(vertex.leaf, last_vertex, p.pdf > 0.0), r * r, cos_light);
             w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, float(LIGHT_SAMPLES) * drawn) : 1.0;
         }
         gathered = shows ? p.throughput * emits * w : vec3(0.0);

@@ -42,6 +42,8 @@ struct BvhTriangle {
     vec3 b;
     uint face;    // coplanar group of the triangle
     vec3 c;
-    float picked; // density per area of light sampling on it; 0 where it is no emitter
+    // Light sampling on it, 0 where it is no emitter: bits of its density per area; with the light hierarchy, the way from
+    // the root, one bit for each node with the first one lowest, below a 1.
+    uint picked;
 };
 #endif

@@ -6,7 +6,9 @@ use super::architecture::Architecture;
 use super::effect::{Cause, Decisions, ForcedEffects, Verdict};
 use super::facts::{Facts, Surroundings};
 use super::knobs::Knobs;
-use super::knobs::rungs::{self, Absorption, Brdf, EffectId, Guiding, Indirect, Reflection, Refraction, Shadows};
+use super::knobs::rungs::{
+    self, Absorption, Brdf, EffectId, Guiding, Indirect, LightSampler, Reflection, Refraction, Shadows,
+};
 use super::left_out::left_out;
 use super::surfaces::{
     self, Surfaces, Transmission, by_wavelength, has_layers, has_lobe_texels, is_transparent, mirrors, refracts,
@@ -15,6 +17,7 @@ use super::surfaces::{
 use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
 use crate::scene::lobe::{LOBES, SHEEN};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
+use crate::transport::emitters::bounded;
 use crate::transport::layers::{SMOOTHEST, is_smooth};
 
 /// Perceptual roughness up to which surfaces have screen-space reflections.
@@ -22,6 +25,10 @@ const ROUGHEST_ON_SCREEN: f32 = 0.2;
 
 /// Number of point and spot lights from which on tiled light culling is used (docs/decisions/light-lists.md).
 const TILES_FROM: u32 = 16;
+
+/// Number of lights and emissive triangles that have a place, from which on a light hierarchy is used
+/// (docs/decisions/paths.md).
+const HIERARCHY_FROM: usize = 16;
 
 /// The inputs of all decisions, and the decisions so far.
 struct Planner<'a> {
@@ -356,6 +363,21 @@ impl Planner<'_> {
             (_, Some(light)) => Cause::of(format!("light \"{}\" has an area", light.name)),
         };
         let shaped = decisions.decide_with(EffectId::AreaLights, by_lights, cause);
+        let count = bounded(scene, emitting);
+        let cause = match kept {
+            false => Cause::against("path tracing is off"),
+            true => Cause::when(
+                count >= HIERARCHY_FROM,
+                format!("{count} lights and emissive triangles have a place"),
+                "too few lights and emissive triangles have a place",
+            ),
+        };
+        // Forced on few lights it would change the noise of the picture.
+        let hierarchy = decisions.decide_apart(
+            EffectId::LightHierarchy,
+            knobs.light_sampler.choice().allows(knobs.light_sampler != LightSampler::Power),
+            cause,
+        );
         let smooth = surfaces.cause(is_smooth, |m| {
             let does = if m.transmission > 0.0 { "refracts" } else { "reflects" };
             format!("{does} light specularly")
@@ -371,7 +393,7 @@ impl Planner<'_> {
             knobs.guiding.choice().allows(knobs.guiding != Guiding::Off),
             cause,
         );
-        paths.then_some(Paths { emitting, shaped, guided, photons: 0 })
+        paths.then_some(Paths { emitting, shaped, hierarchy, guided, photons: 0 })
     }
 
     /// Adds the photons of punctual lights to path tracing: no path reaches such a light by way of a smooth surface.

@@ -148,6 +148,8 @@ pub struct Paths {
     pub emitting: bool,
     /// Some light is an analytic area light.
     pub shaped: bool,
+    /// Lights are sampled by a light hierarchy (knob `light-sampler`).
+    pub hierarchy: bool,
     /// Path guiding with photons.
     pub guided: bool,
     /// Photons of each sample for the photon map of punctual lights; 0 without one.

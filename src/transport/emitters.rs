@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 
 use crate::image::tone::srgb_decode;
 use crate::scene::environment::{Environment, direction};
-use crate::scene::{AlphaMode, Image, Light, LightKind, Material, Scene};
+use crate::scene::{AlphaMode, Image, Instance, Light, LightKind, Material, Scene};
 
 /// A kind of light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +48,8 @@ pub struct Emitter {
 pub struct Emitters {
     /// Lights in the order of their bins.
     pub list: Vec<Emitter>,
+    /// Sum of their powers, relative to π.
+    pub power: f64,
     /// The distribution within the environment.
     pub environment: EnvironmentCdf,
 }
@@ -97,7 +99,7 @@ fn shares(weights: &[f64]) -> Vec<(u32, f64)> {
     firsts.windows(2).map(|pair| (pair[0] as u32, (pair[1] - pair[0]) as f64 / ALL)).collect()
 }
 
-fn mean(rgb: [f32; 3]) -> f64 {
+pub(super) fn mean(rgb: [f32; 3]) -> f64 {
     rgb.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0
 }
 
@@ -157,8 +159,22 @@ impl Emitters {
             first,
             probability,
         });
-        Self { list: list.collect(), environment: cdf }
+        Self { list: list.collect(), power: weights.iter().sum(), environment: cdf }
     }
+}
+
+/// Number of emitters of a scene that have a place: all but the environment and directional lights.
+#[must_use]
+pub fn bounded(scene: &Scene, surfaces: bool) -> usize {
+    let local = |light: &&Light| {
+        light.shines() && !matches!(light.kind, LightKind::Directional { .. }) && !(light.proxy && surfaces)
+    };
+    let triangles = |instance: &Instance| {
+        let mesh = &scene.meshes[instance.mesh];
+        if is_emitter(&scene.materials[mesh.material]) { mesh.indices.len() / 3 } else { 0 }
+    };
+    let emissive: usize = if surfaces { scene.instances.iter().map(triangles).sum() } else { 0 };
+    scene.lights.iter().filter(local).count() + emissive
 }
 
 /// Linear mean of an sRGB-encoded image.

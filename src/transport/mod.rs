@@ -10,6 +10,7 @@ pub mod contact;
 pub mod emitters;
 pub mod events;
 pub mod layers;
+pub mod light_hierarchy;
 mod line;
 pub mod photon_guiding;
 pub mod photon_map;

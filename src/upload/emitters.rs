@@ -1,7 +1,7 @@
-//! The light sampling tables of path tracing on the device (shaders/lib/emitters.glsl): light sampling by power,
-//! environment CDF.
+//! The light sampling tables of path tracing on the device (shaders/lib/emitters.glsl): emitters with their CDF, light
+//! hierarchy, environment CDF.
 //!
-//! [`crate::transport::emitters`] computes them.
+//! [`crate::transport::emitters`] and [`crate::transport::light_hierarchy`] compute them.
 
 use std::sync::Arc;
 
@@ -10,17 +10,23 @@ use ash::vk;
 
 use super::table::upload;
 use crate::gpu::{Buffer, Device, NOTHING};
-use crate::share::{EMITTER_ENVIRONMENT, EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter};
+use crate::share::{
+    EMITTER_ENVIRONMENT, EMITTER_NONE, EMITTER_PUNCTUAL, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter, LightNode,
+};
 use crate::transport::emitters::{EmitterSource, Emitters};
+use crate::transport::light_hierarchy::LightHierarchy;
 
 /// The light sampling tables; dummies without lights.
 pub struct EmittersOnDevice {
-    /// One [`Emitter`] per light, ordered by the CDF.
+    /// One [`Emitter`] per light, ordered by the CDF. With a light hierarchy its bin comes before the emitters in it,
+    /// and its nodes come last.
     pub table: Buffer,
     /// The environment CDF: marginal over rows, then conditional over columns.
     pub sky: Buffer,
-    /// Number of entries in the table.
+    /// Number of bins of the CDF.
     pub count: u32,
+    /// Texel of the root of the light hierarchy, if there is one.
+    pub nodes: Option<u32>,
     /// Whether some entries are punctual or analytic area lights.
     pub punctual: bool,
     /// Whether some entries are emissive triangles.
@@ -36,7 +42,12 @@ impl EmittersOnDevice {
     ///
     /// # Errors
     /// When memory is short.
-    pub fn new(device: &Arc<Device>, emitters: &Emitters, leaf_places: &[u32]) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        emitters: &Emitters,
+        leaf_places: &[u32],
+        hierarchy: Option<&LightHierarchy>,
+    ) -> Result<Self> {
         let shared = |emitter: &crate::transport::emitters::Emitter| {
             let (kind, place) = match emitter.source {
                 EmitterSource::Environment => (EMITTER_ENVIRONMENT, 0),
@@ -51,18 +62,29 @@ impl EmittersOnDevice {
             };
             Emitter { first: emitter.first, probability: emitter.probability as f32, kind, place }
         };
-        let list: Vec<Emitter> = emitters.list.iter().map(shared).collect();
+        let mut list: Vec<Emitter> = emitters.list.iter().map(shared).collect();
+        let mut count = list.len() as u32;
+        if let Some(LightHierarchy { first, .. }) = hierarchy {
+            let probability: f64 = emitters.list[*first..].iter().map(|emitter| emitter.probability).sum();
+            let bin =
+                Emitter { first: list[*first].first, probability: probability as f32, kind: EMITTER_NONE, place: 0 };
+            list.insert(*first, bin);
+            count = *first as u32 + 1;
+        }
+        let nodes: &[LightNode] = hierarchy.map_or(&[], |hierarchy| &hierarchy.nodes);
+        let table = [bytemuck::cast_slice::<_, u8>(&list), bytemuck::cast_slice(nodes)].concat();
         let any = |test: fn(&EmitterSource) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
         let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
         Ok(Self {
-            table: upload(device, name("emitters", list.is_empty()), &list, Some(vk::Format::R32G32B32A32_UINT))?,
+            table: upload(device, name("emitters", list.is_empty()), &table, Some(vk::Format::R32G32B32A32_UINT))?,
             sky: upload(
                 device,
                 name("shares of the environment", emitters.environment.words.is_empty()),
                 &emitters.environment.words,
                 Some(vk::Format::R32_UINT),
             )?,
-            count: list.len() as u32,
+            count,
+            nodes: hierarchy.map(|_| list.len() as u32),
             punctual: any(|source| matches!(source, EmitterSource::Punctual(_))),
             triangles: any(|source| matches!(source, EmitterSource::Triangle { .. })),
             columns: emitters.environment.columns,

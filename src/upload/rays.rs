@@ -32,6 +32,7 @@ use crate::share::{
 };
 use crate::transport::bvh::{Format, Order, Triangle};
 use crate::transport::emitters::{EmitterSource, Emitters};
+use crate::transport::light_hierarchy::LightHierarchy;
 use crate::transport::photon_guiding::PhotonGuiding;
 use crate::transport::photon_map::PhotonEmission;
 
@@ -187,11 +188,26 @@ impl RaysOnDevice {
             })
             .collect();
         let corners = CornerTable::of(scene, solids, rays, plan.paths.is_some());
-        // Paths that hit an emissive triangle need its density as a light sample: its probability over its area.
-        let mut picked = vec![0.0; scene.triangles()];
-        for emitter in &emitters.list {
+        // The way back from a triangle of the scene to its leaf; dropped triangles have none.
+        let mut leaf_places = vec![u32::MAX; scene.triangles()];
+        for (place, t) in bvh.triangles.iter().enumerate() {
+            leaf_places[(first_triangle[t.instance as usize] + t.primitive) as usize] = place as u32;
+        }
+        let by_place = plan.paths.is_some_and(|paths| paths.hierarchy).then(|| {
+            let corners_of = |index: u32| {
+                let t = bvh.triangles.get(leaf_places[index as usize] as usize)?;
+                Some(corners.order(t).map(|i| glam::Vec3::from(t.corners[i]).as_dvec3()))
+            };
+            LightHierarchy::of(emitters, &scene.lights, bvh.anchor, corners_of)
+        });
+        let by_place = by_place.filter(|hierarchy| !hierarchy.nodes.is_empty());
+        // Paths that hit an emissive triangle need its density as a light sample: its probability over its area. With a
+        // light hierarchy the probability depends on the point, and they need the way to it.
+        let mut picked = vec![0; scene.triangles()];
+        for (i, emitter) in emitters.list.iter().enumerate() {
             if let EmitterSource::Triangle { index, area, .. } = emitter.source {
-                picked[index as usize] = (emitter.probability / area) as f32;
+                let density = (emitter.probability / area) as f32;
+                picked[index as usize] = by_place.as_ref().map_or(density.to_bits(), |by_place| by_place.trails[i]);
             }
         }
         // Triangles in leaf order, with the front counter-clockwise also where the instance is mirrored.
@@ -206,11 +222,6 @@ impl RaysOnDevice {
                 BvhTriangle { a, stops, b, face, c, picked }
             })
             .collect();
-        // The way back from a triangle of the scene to its leaf; dropped triangles have none.
-        let mut leaf_places = vec![u32::MAX; scene.triangles()];
-        for (place, t) in bvh.triangles.iter().enumerate() {
-            leaf_places[(first_triangle[t.instance as usize] + t.primitive) as usize] = place as u32;
-        }
         let hit_corners: Vec<[u32; 4]> = bvh.triangles.par_iter().flat_map_iter(|t| corners.texels(t)).collect();
         let layout_ms = start.elapsed().as_secs_f64() * 1e3;
         let grid = bvh.grid();
@@ -253,7 +264,7 @@ impl RaysOnDevice {
             triangles: triangle_buffer,
             corners: corner_buffer,
             faces,
-            emitters: EmittersOnDevice::new(device, emitters, &leaf_places)?,
+            emitters: EmittersOnDevice::new(device, emitters, &leaf_places, by_place.as_ref())?,
             guiding: match plan.paths.is_some_and(|paths| paths.guided) {
                 true => GuidingOnDevice::new(device, &PhotonGuiding::of(scene, solids, bvh, emitters))?,
                 false => GuidingOnDevice::none(device)?,
@@ -284,7 +295,7 @@ impl RaysOnDevice {
             corners: nothing(vk::Format::R32G32B32A32_UINT)?,
             faces: Vec::new(),
             leaf_places: Buffer::new(device, NOTHING, 0, Place::Device)?,
-            emitters: EmittersOnDevice::new(device, &Emitters::default(), &[])?,
+            emitters: EmittersOnDevice::new(device, &Emitters::default(), &[], None)?,
             guiding: GuidingOnDevice::none(device)?,
             photons: PhotonsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,

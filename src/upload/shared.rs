@@ -107,6 +107,8 @@ impl<'a> OnDevice<'a> {
                 area_emitters: paths.shaped && emitters.punctual,
                 emissive_triangles: emitters.triangles,
                 sampled_environment: emitters.rows > 0,
+                light_hierarchy: emitters.nodes.is_some(),
+                light_nodes: emitters.nodes.unwrap_or(0),
                 cdf_columns: emitters.columns,
                 cdf_rows: emitters.rows,
                 cdf_search_steps: binary_search_steps(emitters.columns.max(emitters.rows)),

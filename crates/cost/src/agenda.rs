@@ -169,8 +169,8 @@ fn of_local(knob: &Knob, rung: &str) -> bool {
     }
 }
 
-/// Rungs to which the reference's rungs are changed. Samples, light samples and path guiding change noise, which the
-/// presets show.
+/// Rungs to which the reference's rungs are changed. Samples, light samples, the light sampler and path guiding change
+/// noise, which the presets show.
 fn of_exact(knob: &Knob, rung: &str) -> bool {
     match knob.name {
         "samples" | "colour" => false,

@@ -8,7 +8,9 @@ use serde::Serialize;
 
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
-use etalon::plan::rungs::{Absorption, Caustics, Colour, Guiding, Indirect, Lights, Reflection, Refraction, Shadows};
+use etalon::plan::rungs::{
+    Absorption, Caustics, Colour, Guiding, Indirect, LightSampler, Lights, Reflection, Refraction, Shadows,
+};
 use etalon::plan::{Choice, Effect, EffectId, EffectState, ForcedEffects, Knob, Knobs, Model};
 use etalon::prepare::Original;
 use etalon::scene::Camera;
@@ -177,15 +179,18 @@ impl Subject<'_> {
 /// tracing needs.
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
-    let by_lights = [Lights::Area1.choice(), Guiding::Photons.choice()];
+    let by_lights = [Lights::Area1.choice(), LightSampler::Hierarchy.choice(), Guiding::Photons.choice()];
     match effect {
         EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
         EffectId::PathTracing => paths.into(),
         EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
-        EffectId::EmissiveLights | EffectId::AreaLights | EffectId::PathGuiding => [&paths[..], &by_lights].concat(),
+        EffectId::EmissiveLights | EffectId::AreaLights | EffectId::LightHierarchy | EffectId::PathGuiding => {
+            [&paths[..], &by_lights].concat()
+        }
         EffectId::Caustics => [&paths[..], &[Caustics::Photons16384.choice()]].concat(),
         _ if dropped_by == Indirect::Path.choice() => {
-            vec![Indirect::Ambient.choice(), Lights::Points.choice(), Guiding::Off.choice(), Caustics::Off.choice()]
+            let without = [LightSampler::Power.choice(), Guiding::Off.choice(), Caustics::Off.choice()];
+            [&[Indirect::Ambient.choice(), Lights::Points.choice()][..], &without].concat()
         }
         _ => {
             let recursive = Knobs::of(Model::Recursive);

@@ -160,7 +160,7 @@ pub fn price(
 /// Whether a change affects the noise alone, not the expected value.
 fn by_chance(change: &Change) -> bool {
     match change.knob.as_str() {
-        "guiding" => true,
+        "light-sampler" | "guiding" => true,
         "lights" => change.from != "points" && change.to != "points",
         _ => false,
     }

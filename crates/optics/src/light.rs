@@ -76,6 +76,27 @@ pub fn ball_reach(distance2: f64, radius: f64, cos_theta: f64, sin2_theta: f64) 
     (d * cos_theta - (radius * radius - distance2 * sin2_theta).max(0.0).sqrt()).max(1e-6 * d)
 }
 
+/// @eq R4: importance of a node of the light hierarchy: I cos⁺θ'/max(d², r²), 0 where θ' > θ_e; `node` is the radius,
+/// cosθ_o, cosθ_e and I.
+#[must_use]
+pub fn light_importance(to_point: DVec3, axis: DVec3, node: [f64; 4], two_sided: bool) -> f64 {
+    let [radius, cos_o, cos_e, intensity] = node;
+    let (d2, r2) = (to_point.length_squared(), (radius * radius).max(LIGHT_RADIUS * LIGHT_RADIUS));
+    if d2 <= r2 {
+        return intensity / r2;
+    }
+    let beyond = emission_angle(to_point, axis, two_sided) - cos_o.acos() - (r2 / d2).sqrt().asin();
+    let cosine = beyond.max(0.0).cos();
+    if cosine < cos_e { 0.0 } else { intensity * cosine.max(0.0) / d2 }
+}
+
+/// Angle between an axis and the direction to a point; of a two-sided emitter with the nearer end of the axis.
+fn emission_angle(to_point: DVec3, axis: DVec3, two_sided: bool) -> f64 {
+    let across = axis.cross(to_point).length();
+    let along = axis.dot(to_point);
+    across.atan2(if two_sided { along.abs() } else { along })
+}
+
 /// @eq R2: density per solid angle of what was drawn per area.
 #[must_use]
 pub fn density_per_solid_angle(per_area: f64, r2: f64, cos_theta: f64) -> f64 {
@@ -92,6 +113,18 @@ fn point_row(p: DVec3, l: DVec3, n: DVec3, intensity: f64) -> Vec<f32> {
 fn to_light(d: &mut SplitMix64, n: DVec3, distance: f64) -> DVec3 {
     let c = cosine_in(d) * if d.below(4) == 0 { -1.0 } else { 1.0 };
     at_cosine(d, n, c) * distance
+}
+
+/// A node whose radius is `part` of its distance, with a cone of axes of cosine in `cosines`.
+fn importance_row(d: &mut SplitMix64, part: f64, cosines: [f64; 2]) -> Vec<f32> {
+    let distance = d.log(1e-3, 1e3);
+    let [low, high] = cosines;
+    let mut row = columns(&[d.direction() * distance]);
+    row.push((part * distance) as f32);
+    row.extend(columns(&[d.direction()]));
+    let two_sided = if d.below(2) == 0 { 0.0 } else { 1.0 };
+    row.extend([d.between(low, high) as f32, d.unit() as f32, two_sided, d.log(1e-6, 1.0) as f32]);
+    row
 }
 
 /// The equations of this file.
@@ -378,6 +411,64 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
         }],
         axis: Axis { name: "distance/radius", log: true, of: |x| x[0].sqrt() / x[1], column: 0, relative: true },
+        extreme: -1.0,
+    },
+    Equation {
+        name: "light_importance",
+        twin: |x| vec![light_importance(vector(x, 0), vector(x, 4), [x[3], x[7], x[8], x[10]], x[9] != 0.0)],
+        regions: &[
+            Region { name: "points and spots", share: 1, draw: |d| importance_row(d, 0.0, [-1.0, 1.0]) },
+            Region {
+                name: "from outside",
+                share: 3,
+                draw: |d| {
+                    let part = d.log(1e-4, 0.99);
+                    importance_row(d, part, [-1.0, 1.0])
+                },
+            },
+            Region {
+                name: "from inside",
+                share: 1,
+                draw: |d| {
+                    let part = d.log(1.01, 1e4);
+                    importance_row(d, part, [-1.0, 1.0])
+                },
+            },
+            Region {
+                name: "narrow cones",
+                share: 1,
+                draw: |d| {
+                    let part = d.log(1e-4, 0.1);
+                    importance_row(d, part, [0.99, 1.0])
+                },
+            },
+        ],
+        outputs: &[Output {
+            name: "importance",
+            bound: "I/d² times 2e-6 + the roundings of three cosines over the sines, each at most its root; none at θ_e",
+            allowed: |c| {
+                let (to_point, axis) = (vector(c.inputs, 0), vector(c.inputs, 4));
+                let d2 = to_point.length_squared();
+                let sin_b = c.inputs[3].max(LIGHT_RADIUS) / d2.sqrt();
+                if sin_b >= 1.0 {
+                    return c.ulps(6.0);
+                }
+                let theta = emission_angle(to_point, axis, c.inputs[9] != 0.0);
+                // Of an angle, from a cosine that has the error 5e-7.
+                let error = |sine: f64| (5e-7 / sine).min(1.1e-3);
+                let cos_b = (1.0 - sin_b * sin_b).sqrt();
+                let all = error(theta.sin()) + error((1.0 - c.inputs[7].powi(2)).max(0.0).sqrt()) + error(cos_b) + 2e-6;
+                let beyond = (theta - c.inputs[7].acos() - sin_b.asin()).max(0.0).cos();
+                if (beyond - c.inputs[8]).abs() <= all { f64::INFINITY } else { c.inputs[10] / d2 * all }
+            },
+        }],
+        axis: Axis {
+            name: "radius/distance",
+            log: true,
+            of: |x| x[3] / vector(x, 0).length(),
+            column: 0,
+            relative: true,
+        },
         extreme: -1.0,
     },
     Equation {

@@ -54,6 +54,8 @@ effects! {
         "an emissive surface, with `lights=area:N` and path tracing" => "a table of triangles; code",
     AreaLights = "analytic area lights":
         "a sphere, disk or rectangle light, with `lights=area:N` and path tracing" => "code",
+    LightHierarchy = "light hierarchy":
+        "16 point, spot and area lights and emissive triangles, with `light-sampler=hierarchy` and path tracing" => "a table of nodes; code",
     PathGuiding = "path guiding":
         "a smooth surface that light reaches and that sends it to a diffuse one, with `guiding=photons` and path tracing" => "photons, a grid of cells with bounding spheres; code",
     Caustics = "caustics of punctual lights":
@@ -96,6 +98,7 @@ knobs! {
     quadrature: Quadrature,
     indirect: Indirect,
     lights: Lights,
+    light_sampler: LightSampler,
     guiding: Guiding,
     caustics: Caustics,
     samples: Samples,
@@ -439,6 +442,20 @@ impl Lights {
     pub fn places(self) -> u32 {
         number(self.name(), "area:").unwrap_or(1)
     }
+}
+
+knob! {
+    LightSampler = "light-sampler" {
+        /// Lights are chosen by their power, whatever the surface: noisy where many lights are far apart.
+        Power = "power",
+        /// Lights are chosen by their importance at each surface, from a light hierarchy: less noise with many lights.
+        Hierarchy = "hierarchy",
+    }
+    presets: [Power, Power, Hierarchy],
+    exact: Hierarchy,
+    lecture: ["R4", "R6"],
+    effects: [LightHierarchy],
+    about: "choice of a light at a path vertex: by power alone, or by a light hierarchy with distance and orientation; the same mean",
 }
 
 knob! {
