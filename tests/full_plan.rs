@@ -35,8 +35,8 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, forced: ForcedEffects) -> (Pict
     (renderer.film().expect("the film"), renderer.plan().effects.clone())
 }
 
-/// Effects that no demand includes: each makes another picture, or one with other roundings, wherever it is.
-const APART: [&str; 3] = ["coincident interfaces", "spectral rendering", "dispersion"];
+/// Effects that no demand includes: each makes another picture, or one with other noise or roundings, wherever it is.
+const APART: [&str; 4] = ["coincident interfaces", "light hierarchy", "spectral rendering", "dispersion"];
 
 /// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and what
 /// stands apart.

@@ -503,6 +503,33 @@ fn lights_are_there_where_something_is_lit() {
     .check();
 }
 
+/// The hierarchy lies in the table of emitters, which then has one bin for all lights that have a place.
+#[test]
+fn the_light_hierarchy_brings_its_nodes() {
+    let lit = |count: usize, kind: LightKind| {
+        let mut made = ball(chalk(), None);
+        (0..count).for_each(|_| made.light([10.0 / count as f32; 3], kind));
+        made
+    };
+    let lamp = LightKind::Point { position: DVec3::new(1.0, 2.0, 3.0), range: None };
+    let reason = "too few lights and emissive triangles have a place";
+    let paths = &["indirect=path", "light-sampler=hierarchy"];
+    let case = Case::new("light hierarchy", reason, lit(2, lamp), lit(3, lamp));
+    let brings: &[&[&str]] =
+        &[&["path.emitters", "path.emitter_search_steps", "path.light_hierarchy", "path.light_nodes"]];
+    let [without, with] = Case { environments: [None, None], choices: paths, brings, same: false, ..case }.check();
+    // Emitters of 16 bytes and nodes of 32: two emitters; the bin, three emitters and five nodes.
+    assert_eq!([&without, &with].map(|drawn| drawn.objects["emitters"]), [2 * 16, 4 * 16 + 5 * 32]);
+    // Where it is a knob's choice, and not of the lights that have no place.
+    let switched_off = draw(&lit(3, lamp).0, None, &["indirect=path", "light-sampler=power"]);
+    assert_eq!(state(&switched_off.plan, "light hierarchy"), ("switched off", "light-sampler=power".to_owned()));
+    assert_eq!(switched_off.objects["emitters"], 3 * 16);
+    let sun = LightKind::Directional { direction: DVec3::NEG_Y };
+    assert_eq!(state(&draw(&lit(3, sun).0, None, paths).plan, "light hierarchy"), ("not needed", reason.to_owned()));
+    let apart = draw(&lit(3, lamp).0, None, &["indirect=ambient"]);
+    assert_eq!(state(&apart.plan, "light hierarchy"), ("not needed", "path tracing is off".to_owned()));
+}
+
 /// Neither mirrors nor scattered light are needed for what is seen through glass: all that enters a ball leaves it,
 /// which at the middle is 1 − F0 of a white environment; the rest is mirrored.
 #[test]

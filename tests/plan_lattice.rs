@@ -602,8 +602,14 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths: kept nowhere without them.
-const OF_PATHS: [&str; 5] =
-    ["path guiding", "rough transmission", "analytic area lights", "path tracing", "emissive surfaces as lights"];
+const OF_PATHS: [&str; 6] = [
+    "path guiding",
+    "rough transmission",
+    "analytic area lights",
+    "light hierarchy",
+    "path tracing",
+    "emissive surfaces as lights",
+];
 
 /// Effects of another rung of `colour`: tests/spectra.rs has them.
 const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];

@@ -28,7 +28,7 @@ const TILES_FROM: u32 = 16;
 
 /// Number of lights and emissive triangles that have a place, from which on a light hierarchy is used
 /// (docs/decisions/paths.md).
-const HIERARCHY_FROM: usize = 16;
+const HIERARCHY_FROM: usize = 3;
 
 /// The inputs of all decisions, and the decisions so far.
 struct Planner<'a> {

@@ -2,8 +2,8 @@
 //! importance at the shaded point.
 //!
 //! Read Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting"; pbrt (4th ed.),
-//! section 12.6.3 (BVH light sampling). A node bounds its emitters: a sphere for their positions, a cone for their
-//! orientations, and the sum of their intensities. `descend_light_hierarchy` of shaders/lib/emitters.glsl walks from the
+//! section 12.6.3 (BVH light sampling). A node bounds its emitters: a sphere for their positions, an orientation
+//! cone, and the sum of their intensities. `descend_light_hierarchy` of shaders/lib/emitters.glsl walks from the
 //! root to a leaf and chooses between two children in proportion to their importance.
 //!
 //! Assumes: bvh space, metres. Nodes are stored as the device reads them, rounded so that they still bound.
@@ -46,7 +46,7 @@ pub struct LightHierarchy {
 struct LightBounds {
     low: DVec3,
     high: DVec3,
-    /// Axis of the cone that holds the axes of the emitters.
+    /// Axis of the orientation cone, which holds the axes of the emitters.
     axis: DVec3,
     /// Half angle θ_o of that cone.
     spread: f64,
@@ -213,16 +213,19 @@ impl LightHierarchy {
         }
     }
 
+    /// Axis of a node's cone, and the cosines of θ_o and θ_e, as the device reads them.
+    #[must_use]
+    pub fn cone(node: &LightNode) -> (DVec3, [f64; 2]) {
+        (axis_of(node.axis), [cosine_of(node.cosines), cosine_of(node.cosines >> 16)])
+    }
+
     /// Importance of a node at a point: `node_importance` of shaders/lib/emitters.glsl in f64.
     #[must_use]
     pub fn importance(node: &LightNode, point: DVec3) -> f64 {
         let to_point = point - glam::Vec3::from(node.centre).as_dvec3();
-        light_importance(
-            to_point,
-            axis_of(node.axis),
-            [node.radius.into(), cosine_of(node.cosines), cosine_of(node.cosines >> 16), node.intensity.into()],
-            node.link & LIGHT_TWO_SIDED != 0,
-        )
+        let (axis, [cos_o, cos_e]) = Self::cone(node);
+        let bounds = [node.radius.into(), cos_o, cos_e, node.intensity.into()];
+        light_importance(to_point, axis, bounds, node.link & LIGHT_TWO_SIDED != 0)
     }
 
     /// Probability with which the descent from the root ends at an emitter: `descend_light_hierarchy` in f64, without

@@ -205,7 +205,9 @@ fn a_scene_that_calls_for_nothing_has_a_report() {
     let called: Vec<&Value> =
         list(&table, "knobs").iter().filter(|k| k["called_for"] == true).map(|k| &k["knob"]).collect();
     assert!(
-        !called.iter().any(|knob| ["shadows", "refraction", "absorption", "guiding"].iter().any(|no| *knob == no)),
+        !called.iter().any(|knob| ["shadows", "refraction", "absorption", "light-sampler", "guiding"]
+            .iter()
+            .any(|no| *knob == no)),
         "{called:?}"
     );
 }

@@ -55,7 +55,7 @@ effects! {
     AreaLights = "analytic area lights":
         "a sphere, disk or rectangle light, with `lights=area:N` and path tracing" => "code",
     LightHierarchy = "light hierarchy":
-        "16 point, spot and area lights and emissive triangles, with `light-sampler=hierarchy` and path tracing" => "a table of nodes; code",
+        "3 point, spot and area lights or emissive triangles, with `light-sampler=hierarchy` and path tracing" => "a table of nodes; code",
     PathGuiding = "path guiding":
         "a smooth surface that light reaches and that sends it to a diffuse one, with `guiding=photons` and path tracing" => "photons, a grid of cells with bounding spheres; code",
     Caustics = "caustics of punctual lights":
