@@ -68,9 +68,12 @@ fn panels(count: usize) -> Made {
     made
 }
 
-/// All kinds of lights: coincident ones, weak ones beside strong ones, spots that miss the floor, areas.
+/// All kinds of lights: coincident ones, weak ones beside strong ones, spots that miss the floor, areas, and a triangle
+/// that has no area once its corners are rounded.
 fn kinds() -> Made {
     let mut made = panels(6);
+    let glow = Material { emissive: [20.0; 3], ..lambert([0.0; 3]) };
+    made.add(Shape::panel(1.0, 1.0), glow, at(9.0, 1.0, 9.0) * DAffine3::from_scale(DVec3::splat(1e-9)));
     let mut random = Random(13);
     let up_or_down = |i: usize| if i.is_multiple_of(2) { DVec3::NEG_Y } else { DVec3::Y };
     for i in 0..6 {
@@ -269,7 +272,10 @@ fn have_one_mean(gpu: &Gpu, name: &str, made: &Made, environment: Option<&Enviro
 
 #[test]
 fn many_points_light_alike_by_both_samplers() {
-    have_one_mean(&Gpu::open(), "points", &points(100), None, &["samples=256", "interfaces=1"]);
+    let gpu = Gpu::open();
+    for count in [3, 100] {
+        have_one_mean(&gpu, &format!("{count} points"), &points(count), None, &["samples=256", "interfaces=1"]);
+    }
 }
 
 /// Paths pass the pane undeflected before they hit a panel, so that the last vertex for MIS is not where the ray starts.
