@@ -278,13 +278,32 @@ fn many_points_light_alike_by_both_samplers() {
     }
 }
 
+/// A ceiling of 36 panels, with a pane just below it. From the floor all panels are about as important; from the pane it
+/// is those at the same place.
+fn ceiling() -> Made {
+    let mut made = Made::new("ceiling");
+    made.add(Shape::panel(6.0, 6.0), lambert([0.7; 3]), DAffine3::from_rotation_x(-FRAC_PI_2));
+    let lamp = Material { emissive: [1.0; 3], double_sided: false, ..lambert([0.0; 3]) };
+    let mesh = made.mesh(Shape::panel(1.0, 1.0), lamp);
+    for i in 0..36 {
+        let place = at(f64::from(i % 6) - 2.5, 2.0, f64::from(i / 6) - 2.5);
+        made.place(mesh, place * DAffine3::from_rotation_x(FRAC_PI_2));
+    }
+    made.camera(DVec3::Y * 1.5, DVec3::ZERO, orthographic(2.0));
+    made
+}
+
 /// Paths pass the pane undeflected before they hit a panel, so that the last vertex for MIS is not where the ray starts.
 #[test]
 fn panels_behind_a_pane_light_alike_by_both_samplers() {
-    let mut made = panels(40);
+    let gpu = Gpu::open();
     let pane = Material { transmission: 1.0, roughness: 0.0, specular: 0.0, ..lambert([0.9; 3]) };
-    made.add(Shape::panel(40.0, 40.0), pane, at(0.0, 0.3, 0.0) * DAffine3::from_rotation_x(-FRAC_PI_2));
-    have_one_mean(&Gpu::open(), "panels", &made, None, &["samples=256", "interfaces=4"]);
+    for (mut made, height) in [(panels(40), 0.3), (ceiling(), 1.9)] {
+        let flat = at(0.0, height, 0.0) * DAffine3::from_rotation_x(-FRAC_PI_2);
+        made.add(Shape::panel(40.0, 40.0), pane.clone(), flat);
+        let name = format!("{} behind a pane", made.0.name);
+        have_one_mean(&gpu, &name, &made, None, &["samples=256", "interfaces=4"]);
+    }
 }
 
 #[test]
