@@ -273,8 +273,8 @@ fn have_one_mean(gpu: &Gpu, name: &str, made: &Made, environment: Option<&Enviro
 #[test]
 fn many_points_light_alike_by_both_samplers() {
     let gpu = Gpu::open();
-    for count in [3, 100] {
-        have_one_mean(&gpu, &format!("{count} points"), &points(count), None, &["samples=256", "interfaces=1"]);
+    for (count, samples) in [(3, "samples=1024"), (100, "samples=256")] {
+        have_one_mean(&gpu, &format!("{count} points"), &points(count), None, &[samples, "interfaces=1"]);
     }
 }
 
