@@ -187,7 +187,7 @@ fn probabilities_sum_to_one_and_no_light_is_lost() {
     scenes.push(("degenerate".to_owned(), degenerate));
     for (name, made) in scenes {
         let (emitters, hierarchy) = hierarchy(&made.0);
-        assert!(hierarchy.nodes.len() >= 1, "{name}");
+        assert!(!hierarchy.nodes.is_empty(), "{name}");
         for point in places() {
             let of = |i: usize| hierarchy.probability(i, |node| LightHierarchy::importance(node, point));
             let all: Vec<f64> = (0..emitters.list.len()).map(of).collect();
