@@ -152,8 +152,8 @@ fn everything_can_be_planned() {
         plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] == state).count()
     };
     assert!(count(&lean, "not needed") > 10);
-    // Bodies that touch are another picture, and so is dispersion.
-    assert_eq!(count(&full, "not needed"), 2);
+    // Bodies that touch are another picture, and so are dispersion and lights chosen by a hierarchy.
+    assert_eq!(count(&full, "not needed"), 3);
     let reasons = full["effects"].to_string();
     assert!(reasons.contains("asked for, although no visible material uses it"), "{reasons}");
     assert!(full["pipelines"].as_array().expect("a list").len() > lean["pipelines"].as_array().expect("a list").len());
