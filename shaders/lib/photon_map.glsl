@@ -15,11 +15,6 @@ layout(paths, rgba32ui) readonly uniform uimageBuffer photon_map; // nodes, then
 // @texels PhotonNode photon_node_at(photon_map)
 // @texels Photon photon_at(photon_map)
 
-// Smallest cosine between the normals of a vertex and of a photon that counts for it.
-const float SAME_SURFACE = 0.8;
-// Largest distance of a vertex from a photon's plane, in radii of its disk.
-const float THICKNESS = 0.25;
-
 // Light from one photon, which stands for all whose disks cover the vertex.
 struct PhotonSample {
     vec3 to_light; // unit vector
@@ -34,7 +29,7 @@ vec3 irradiance_of(Photon photon, vec3 p, vec3 n) {
     float height = dot(off, normal);
     float across2 = dot(off, off) - height * height;
     float share = 1.0 - across2 / (radius * radius);
-    bool covers = share > 0.0 && abs(height) <= THICKNESS * radius && abs(dot(n, normal)) >= SAME_SURFACE;
+    bool covers = share > 0.0 && abs(height) <= DISK_THICKNESS * radius && abs(dot(n, normal)) >= SAME_SURFACE;
     return covers ? photon.irradiance * share : vec3(0.0);
 }
 

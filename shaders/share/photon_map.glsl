@@ -36,4 +36,8 @@ struct Photon {
 };
 
 const uint PHOTON_COUNT_BITS = 3;
+// Smallest cosine between the normals of two points that lie on one surface.
+const float SAME_SURFACE = 0.8;
+// Largest distance of a point from a photon's plane, in radii of its disk.
+const float DISK_THICKNESS = 0.25;
 #endif

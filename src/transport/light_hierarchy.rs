@@ -11,10 +11,11 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use bytemuck::Zeroable as _;
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use half::f16;
 
 use super::emitters::{EmitterSource, Emitters, mean};
+use super::octahedral::{octahedral_from_unit, pack_snorm_2x16, unit_from_octahedral, unpack_snorm_2x16};
 use crate::optics::light::light_importance;
 use crate::scene::{Extent, Light, LightKind};
 use crate::share::{LIGHT_INDEX, LIGHT_LEAF, LIGHT_TWO_SIDED, LightNode};
@@ -216,7 +217,7 @@ impl LightHierarchy {
     /// Axis of a node's cone, and the cosines of θ_o and θ_e, as the device reads them.
     #[must_use]
     pub fn cone(node: &LightNode) -> (DVec3, [f64; 2]) {
-        (axis_of(node.axis), [cosine_of(node.cosines), cosine_of(node.cosines >> 16)])
+        (unit_from_octahedral(unpack_snorm_2x16(node.axis)), [cosine_of(node.cosines), cosine_of(node.cosines >> 16)])
     }
 
     /// Importance of a node at a point: `node_importance` of shaders/lib/emitters.glsl in f64.
@@ -310,7 +311,7 @@ fn node(lights: &[Bounded], link: u32) -> LightNode {
     LightNode {
         centre: centre.to_array(),
         radius: (radius as f32).next_up(),
-        axis: octahedral(all.axis),
+        axis: pack_snorm_2x16(octahedral_from_unit(all.axis)),
         cosines: u32::from(cosines[0]) | u32::from(cosines[1]) << 16,
         intensity: all.intensity as f32,
         link: link | if all.two_sided { LIGHT_TWO_SIDED } else { 0 },
@@ -330,22 +331,4 @@ fn below(cosine: f64) -> f16 {
 
 fn cosine_of(halves: u32) -> f64 {
     f16::from_bits(halves as u16).to_f64()
-}
-
-/// Octahedral encoding of a unit vector in 2x16 bits, for `unpackSnorm2x16`.
-fn octahedral(n: DVec3) -> u32 {
-    let p = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
-    let one = |x: f64| if x >= 0.0 { 1.0 } else { -1.0 };
-    let folded = if n.z < 0.0 { DVec2::new((1.0 - p.y.abs()) * one(p.x), (1.0 - p.x.abs()) * one(p.y)) } else { p };
-    let [x, y] = folded.to_array().map(|x| u32::from((x * 32767.0).round() as i16 as u16));
-    x | y << 16
-}
-
-/// The unit vector of [`octahedral`], as `unit_from_octahedral` of shaders/lib/encode.glsl decodes it.
-fn axis_of(word: u32) -> DVec3 {
-    let [x, y] = [word, word >> 16].map(|half| f64::from(half as u16 as i16).max(-32767.0) / 32767.0);
-    let z = 1.0 - x.abs() - y.abs();
-    let fold = (-z).max(0.0);
-    let towards = |x: f64| x + if x >= 0.0 { -fold } else { fold };
-    DVec3::new(towards(x), towards(y), z).normalize()
 }

@@ -15,10 +15,11 @@ use rayon::prelude::*;
 use super::aabb::Aabb;
 use super::bvh::Bvh;
 use super::line;
+use super::octahedral::{octahedral_from_unit, pack_snorm_2x8, pack_snorm_2x16};
 use super::photon_guiding::{PhotonRandom, is_diffuse};
 use crate::scene::solid::Solids;
 use crate::scene::{Extent, Light, LightKind, Scene};
-use crate::share::{Landing, PHOTON_COUNT_BITS, Photon, PhotonNode, PhotonRay};
+use crate::share::{DISK_THICKNESS, Landing, PHOTON_COUNT_BITS, Photon, PhotonNode, PhotonRay, SAME_SURFACE};
 
 /// Neighbours of a photon on its surface inside its disk. With fewer the density is noisier, with more it is blurred.
 const NEIGHBOURS: usize = 8;
@@ -27,8 +28,6 @@ const LEAF: usize = 4;
 const _: () = assert!(LEAF < 1 << PHOTON_COUNT_BITS);
 /// Largest radius of a disk, and smallest, relative to the radius of the scene.
 const RADII: [f64; 2] = [1e-6, 0.1];
-/// Smallest cosine between the normals of two photons on one surface (`SAME_SURFACE` of the shader).
-const SAME_SURFACE: f32 = 0.8;
 /// Smallest cosine of incidence of a photon: its irradiance perpendicular to its direction is its power over it.
 const GRAZING: f64 = 1e-3;
 /// Rays that look for smooth surfaces, over all lights, and cells of a light's directions along each side.
@@ -396,12 +395,8 @@ impl PhotonTree {
 
 /// A photon of the map, spread over a disk, and the disk's box.
 fn spread(landing: &Landing, radius: f64) -> (Photon, Aabb) {
-    let snorm = |x: f64, most: f64| (x.clamp(-1.0, 1.0) * most).round() as i32;
     let [position, normal, to_light] =
         [landing.position, landing.normal, landing.to_light].map(|v| Vec3::from(v).as_dvec3());
-    let octahedral = |v: DVec3, most: f64| octahedral(v).to_array().map(|x| snorm(x, most));
-    let [u, v] = octahedral(to_light, 32767.0);
-    let [nu, nv] = octahedral(normal, 127.0);
     // The upper half of the float, rounded up: the kernel has the volume of the stored radius.
     let upper = ((radius as f32).to_bits() + 0xffff) & 0xffff_0000;
     let radius = f64::from(f32::from_bits(upper));
@@ -409,19 +404,13 @@ fn spread(landing: &Landing, radius: f64) -> (Photon, Aabb) {
     let peak = 2.0 / (PI * radius * radius * normal.dot(to_light).abs().max(GRAZING));
     let photon = Photon {
         position: landing.position,
-        to_light: u as u32 & 0xffff | (v as u32) << 16,
+        to_light: pack_snorm_2x16(octahedral_from_unit(to_light)),
         irradiance: landing.power.map(|power| (f64::from(power) * peak) as f32),
-        normal_radius: nu as u32 & 0xff | (nv as u32 & 0xff) << 8 | upper,
+        normal_radius: pack_snorm_2x8(octahedral_from_unit(normal)) | upper,
     };
-    // The disk is as thick as the shader allows (`THICKNESS`).
-    let half = ((DVec3::ONE - normal * normal).max(DVec3::ZERO).map(f64::sqrt) + 0.25 * normal.abs()) * radius * 1.001;
+    // A thousandth more than the disk, for the roundings of its normal.
+    let flat = (DVec3::ONE - normal * normal).max(DVec3::ZERO).map(f64::sqrt);
+    let half = (flat + normal.abs() * f64::from(DISK_THICKNESS)) * radius * 1.001;
     let corner = |side: f64| (position + half * side).as_vec3().to_array();
     (photon, Aabb { min: corner(-1.0), max: corner(1.0) })
-}
-
-/// Octahedral encoding of a unit vector (`octahedral_from_unit` of shaders/lib/encode.glsl).
-fn octahedral(n: DVec3) -> DVec2 {
-    let p = n.truncate() / (n.x.abs() + n.y.abs() + n.z.abs());
-    let sign = |x: f64| if x >= 0.0 { 1.0 } else { -1.0 };
-    if n.z < 0.0 { DVec2::new((1.0 - p.y.abs()) * sign(p.x), (1.0 - p.x.abs()) * sign(p.y)) } else { p }
 }
