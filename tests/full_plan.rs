@@ -122,8 +122,9 @@ fn each_effect_alone() {
             assert!(bits(&planned) == bits(&with), "{name}: {}", effect.id.name());
             let kept = account.iter().filter(|kept| kept.id == effect.id && kept.state == EffectState::Kept).count();
             // Surfaces light others along paths alone, and so do lights with a shape.
-            let is_dropped =
-                ["path guiding", "emissive surfaces as lights", "analytic area lights"].contains(&effect.id.name());
+            let of_paths =
+                ["path guiding", "caustics of punctual lights", "emissive surfaces as lights", "analytic area lights"];
+            let is_dropped = of_paths.contains(&effect.id.name());
             let kept_alone = !is_dropped && !APART.contains(&effect.id.name());
             assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.id.name());
         }

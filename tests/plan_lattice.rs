@@ -602,8 +602,9 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths: kept nowhere without them.
-const OF_PATHS: [&str; 6] = [
+const OF_PATHS: [&str; 7] = [
     "path guiding",
+    "caustics of punctual lights",
     "rough transmission",
     "analytic area lights",
     "light hierarchy",

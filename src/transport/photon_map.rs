@@ -127,6 +127,9 @@ impl Source {
 struct Cells {
     side: usize,
     wanted: Vec<bool>,
+    /// The rectangle around them: its smallest corner and its size, in parts of the square.
+    corner: DVec2,
+    size: DVec2,
 }
 
 impl Cells {
@@ -167,12 +170,23 @@ impl Cells {
             };
             (y.saturating_sub(1)..=(y + 1).min(side - 1)).any(|row| columns.iter().any(|&x| is_seen(x, row)))
         });
-        Self { side, wanted: wanted.collect() }
+        let wanted: Vec<bool> = wanted.collect();
+        let places = (0..side * side).filter(|&place| wanted[place]);
+        let places = places.map(|place| DVec2::new((place % side) as f64, (place / side) as f64));
+        let (low, high) =
+            places.fold((DVec2::splat(side as f64), DVec2::ZERO), |(low, high), at| (low.min(at), high.max(at + 1.0)));
+        let (corner, size) = (low / side as f64, (high - low).max(DVec2::ZERO) / side as f64);
+        Self { side, wanted, corner, size }
     }
 
     /// Their part of the square.
     fn share(&self) -> f64 {
         self.wanted.iter().filter(|wanted| **wanted).count() as f64 / self.wanted.len() as f64
+    }
+
+    /// Part of the square that the rectangle around them is.
+    fn around(&self) -> f64 {
+        self.size.x * self.size.y
     }
 
     fn contains(&self, at: DVec2) -> bool {
@@ -192,7 +206,7 @@ pub struct PhotonEmission {
 struct PhotonSource {
     source: Source,
     cells: Cells,
-    /// Points of the whole square; those in wanted cells are photons.
+    /// Points of the rectangle around the wanted cells; those in wanted cells are photons.
     points: u64,
     /// Media around the light, as entries of shaders/lib/media.glsl.
     media: [u32; 4],
@@ -226,7 +240,8 @@ impl PhotonEmission {
             .collect();
         let all: f64 = sought.iter().map(|(.., power)| power).sum();
         let emission = |(light, (source, cells, power)): (&Light, (Source, Cells, f64))| {
-            let points = if power > 0.0 { (f64::from(count) * power / all / cells.share()).ceil() as u64 } else { 0 };
+            let of_light = f64::from(count) * power / all;
+            let points = if power > 0.0 { (of_light * cells.around() / cells.share()).ceil() as u64 } else { 0 };
             let media = match light.kind {
                 LightKind::Directional { .. } => [0; 4],
                 LightKind::Point { position, .. } | LightKind::Spot { position, .. } => media(position),
@@ -247,7 +262,8 @@ impl PhotonEmission {
             let shift = DVec2::new(random.unit(), random.unit());
             let ray = |i: u64| {
                 let at = evenly(i) + shift;
-                let at = at - DVec2::select(at.cmpge(DVec2::ONE), DVec2::ONE, DVec2::ZERO);
+                let at =
+                    cells.corner + cells.size * (at - DVec2::select(at.cmpge(DVec2::ONE), DVec2::ONE, DVec2::ZERO));
                 let mut place = PhotonRandom::new(number ^ i << 32);
                 let (origin, direction, cosine) =
                     cells.contains(at).then(|| source.ray(at, DVec2::new(place.unit(), place.unit())))?;
@@ -255,7 +271,7 @@ impl PhotonEmission {
                     origin: origin.as_vec3().to_array(),
                     light: index as u32,
                     direction: direction.as_vec3().normalize().to_array(),
-                    measure: (source.measure / *points as f64 * cosine.max(0.0)) as f32,
+                    measure: (source.measure * cells.around() / *points as f64 * cosine.max(0.0)) as f32,
                     media: *media,
                 })
             };

@@ -205,7 +205,7 @@ fn a_scene_that_calls_for_nothing_has_a_report() {
     let called: Vec<&Value> =
         list(&table, "knobs").iter().filter(|k| k["called_for"] == true).map(|k| &k["knob"]).collect();
     assert!(
-        !called.iter().any(|knob| ["shadows", "refraction", "absorption", "light-sampler", "guiding"]
+        !called.iter().any(|knob| ["shadows", "refraction", "absorption", "light-sampler", "guiding", "caustics"]
             .iter()
             .any(|no| *knob == no)),
         "{called:?}"

@@ -123,7 +123,7 @@ fn what_is_left_out_has_a_price() {
         .collect();
     let mut alone = vec!["heterogeneous media", "quadrature", "prefiltered environment"];
     alone.extend(["emissive surfaces as lights", "analytic area lights", "light hierarchy", "path guiding"]);
-    alone.push("dispersion");
+    alone.extend(["caustics of punctual lights", "dispersion"]);
     assert_eq!(without, alone);
     assert!(of("material layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
     assert!(of("order-independent transparency")["pipelines"].as_i64() > Some(1), "{costs:?}");

@@ -482,15 +482,15 @@ knob! {
     Caustics = "caustics" {
         /// Where a smooth surface bends or mirrors the light of a point, it does not arrive: shadows behind glass are dark.
         Off = "off",
+        #[doc = caustics_about!("4 thousand")]
+        Photons4096 = "photons:4096",
         #[doc = caustics_about!("16 thousand")]
         Photons16384 = "photons:16384",
         #[doc = caustics_about!("65 thousand")]
         Photons65536 = "photons:65536",
-        #[doc = caustics_about!("262 thousand")]
-        Photons262144 = "photons:262144",
     }
     presets: [Off, Off, Photons16384],
-    exact: Photons262144,
+    exact: Photons65536,
     lecture: ["R6"],
     effects: [Caustics],
     about: "light of punctual lights by way of smooth surfaces: none, or from a photon map of N photons in each sample",
@@ -674,7 +674,7 @@ mod tests {
         assert_eq!(Lights::RUNGS.iter().map(|rung| rung.places()).collect::<Vec<_>>(), [1, 1, 4, 16]);
         assert_eq!(Colour::RUNGS.iter().map(|rung| rung.bands()).collect::<Vec<_>>(), [0, 8, 16, 32]);
         assert_eq!(Guiding::Photons.to_string(), "guiding=photons");
-        assert_eq!(Caustics::RUNGS.iter().map(|rung| rung.photons()).collect::<Vec<_>>(), [0, 16384, 65536, 262_144]);
+        assert_eq!(Caustics::RUNGS.iter().map(|rung| rung.photons()).collect::<Vec<_>>(), [0, 4096, 16384, 65536]);
     }
 
     #[test]
