@@ -352,7 +352,6 @@ impl Renderer {
     pub fn step(&mut self, drawing: &mut Drawing) -> Result<()> {
         let ([index, band], count) = (drawing.next, drawing.count);
         self.set_band(band, index, count);
-        self.look(&drawing.view, index, count, band);
         self.trace_photons(drawing)?;
         // A frame whose transparent fragments did not fit is drawn again with a larger buffer.
         loop {
@@ -491,6 +490,7 @@ impl Renderer {
         let [index, band] = drawing.next;
         let number = u64::from(self.settings.seed) << 32 | u64::from(index) << 8 | u64::from(band);
         let Some(flight) = self.rays.photons.emit(&self.device, number)? else { return Ok(()) };
+        self.look(&drawing.view, index, drawing.count, band);
         let mut frame = self.frame();
         trace_photons(&mut frame, self.library(), &flight)?;
         drawing.times.add(frame.finish()?);

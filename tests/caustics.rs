@@ -5,7 +5,7 @@
 use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::{Architecture, Knobs, Model};
-use etalon::scene::{Camera, LightKind, Material, Scene};
+use etalon::scene::{Camera, Extent, Image, LightKind, Material, Sampler, Scene, TextureRef};
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, bits};
 use etalon_testing::made::{Made, at, lambert, orthographic};
@@ -54,9 +54,10 @@ fn radiance(camera: &Camera, irradiance: impl Fn(DVec3) -> f64) -> f64 {
     sum / f64::from(SIDE * SIDE) * f64::from(ALBEDO) / std::f64::consts::PI
 }
 
-/// Largest relative error of a mean over the pixels. It is of the noise of photons: each stands for eight in its disk, of
-/// which the window shows two and more, in at least 16 sets. Were they at random places, it would be 0.41/√32 = 7 %.
-const WITHIN: f64 = 0.03;
+/// Largest relative error of a mean over the pixels: noise of photons. The window shows two disks and more, in at least 16
+/// sets, and the weight in a disk of eight photons at random places deviates by 0.41: 0.41/√32 = 7 %. Photons lie more
+/// evenly, so that half of it is asked; 1.5 % is the most that was found.
+const WITHIN: f64 = 0.035;
 
 /// Compares the floor's mean radiance with what is expected. Without photons it is dark.
 fn agrees(gpu: &Gpu, what: &str, made: &Made, choices: &[&str], irradiance: impl Fn(DVec3) -> f64) {
@@ -217,18 +218,90 @@ fn a_ball_of_glass_is_the_lens_that_it_is() {
     made.add(Shape::sphere(0.5, 128), glass(), at(0.0, 0.0, 0.6));
     made.light([2.0; 3], point(DVec3::Z * 3.0));
     let of = |p: DVec3| 2.0 * below_a_ball(p.length(), 3.0, 0.6, 0.5);
+    let forms = [Architecture::Cpu, Architecture::Gpu].map(|architecture| {
+        bits(&gpu.shot(&made.0, None, Settings { architecture: Some(architecture), ..settings(&[]) }).1)
+    });
+    assert!(forms[0] == forms[1], "the form for GPUs makes another film");
     agrees(&gpu, "ball", &made, &["samples=64", "caustics=photons:65536"], of);
+}
+
+/// Radiance is n² times as large in a medium of index n. The eye above sees the floor below as dark as the square of the
+/// index makes it.
+#[test]
+fn the_sun_lights_a_floor_under_water() {
+    let gpu = Gpu::open();
+    let mut made = floor(SEEN, DVec3::Z * 1.5, 0.2);
+    made.add(Shape::cuboid(DVec3::new(8.0, 8.0, 0.4)), Material { ior: 1.33, ..glass() }, at(0.0, 0.0, 0.1));
+    made.light([2.0; 3], LightKind::Directional { direction: DVec3::NEG_Z });
+    let (f, _) = fresnel(1.0, 1.33);
+    agrees(&gpu, "floor under water", &made, &[], |_| 2.0 * (1.0 - f).powi(2) / (1.33 * 1.33));
+}
+
+/// A mirror whose roughness is that of a texture.
+#[test]
+fn smooth_texels_deflect_light() {
+    let gpu = Gpu::open();
+    let mut made = floor(SEEN, DVec3::Z * 0.9, 0.2);
+    made.0.images.push(Image {
+        name: "smooth metal".to_owned(),
+        width: 1,
+        height: 1,
+        rgba: vec![255, 0, 255, 255].into(),
+    });
+    let uv_transform = glam::Affine2::IDENTITY;
+    let texture = TextureRef { image: 0, uv_set: 0, uv_transform, sampler: Sampler::default() };
+    let mirror = Material { metallic: 1.0, metallic_roughness_texture: Some(texture), ..lambert([1.0; 3]) };
+    let down = DAffine3::from_translation(DVec3::Z) * DAffine3::from_rotation_x(std::f64::consts::PI);
+    made.add(Shape::panel(6.0, 6.0), Material { specular: 1.0, double_sided: false, ..mirror }, down);
+    let (position, direction) = (DVec3::new(0.8, 0.0, 0.5), DVec3::Z);
+    made.light([2.0; 3], LightKind::Spot { position, direction, range: None, inner: 1.199, outer: 1.2 });
+    let image = DVec3::new(0.8, 0.0, 1.5);
+    agrees(&gpu, "textured mirror", &made, &[], |p| 2.0 * image.z / image.distance(p).powi(3));
+}
+
+/// A disk light that faces a ball ten times smaller: each point of the disk has a caustic of its own.
+#[test]
+fn lights_with_an_area_send_photons_from_all_of_it() {
+    let gpu = Gpu::open();
+    let right = std::f64::consts::FRAC_PI_2;
+    let image = DVec3::new(0.0, 0.0, 3.5);
+    let mirror = Material { metallic: 1.0, roughness: 0.0, specular: 1.0, double_sided: false, ..lambert([1.0; 3]) };
+    let down = DAffine3::from_translation(DVec3::Z * 2.0) * DAffine3::from_rotation_x(std::f64::consts::PI);
+    // The camera sees the floor beside the disk, which casts no shadow.
+    let mut made = floor(DVec3::new(0.1, 0.0, 0.0), DVec3::new(-2.0, 0.0, 1.6), 0.05);
+    made.add(Shape::panel(0.3, 0.3), mirror, down);
+    let (position, direction) = (DVec3::Z * 0.5, DVec3::Z);
+    let kind = LightKind::Spot { position, direction, range: None, inner: right, outer: right };
+    made.light([2.0; 3], kind);
+    made.0.lights[0].extent = Some(Extent::Disk { radius: 0.4 });
+    // Points of the disk's image from which the ray to p goes through the mirror.
+    let irradiance = |p: DVec3| {
+        let (rings, parts) = (200, 400);
+        let mut sum = 0.0;
+        for i in 0..rings * parts {
+            let radius = 0.4 * ((f64::from(i / parts) + 0.5) / f64::from(rings)).sqrt();
+            let turn = std::f64::consts::TAU * (f64::from(i % parts) + 0.5) / f64::from(parts);
+            let q = image + DVec3::new(turn.cos(), turn.sin(), 0.0) * radius;
+            let at_mirror = p + (q - p) * (2.0 / 3.5);
+            let passes = at_mirror.truncate().abs().max_element() < 0.15;
+            let cos = 3.5 / q.distance(p);
+            sum += if passes { cos * cos / q.distance_squared(p) } else { 0.0 };
+        }
+        2.0 * sum / f64::from(rings * parts)
+    };
+    agrees(&gpu, "disk over a small mirror", &made, &["samples=64", "caustics=photons:65536"], irradiance);
 }
 
 #[test]
 fn a_lamp_inside_glass_lights_what_is_outside() {
     let gpu = Gpu::open();
-    // From the middle of a ball all rays leave straight, and what is reflected leaves on the other side.
+    // From the middle of a ball all rays leave straight, and what is reflected leaves on the other side. A light gives
+    // radiance over n², as emissive surfaces do.
     let mut made = floor(SEEN, DVec3::Z * 0.9, 0.1);
     made.add(Shape::sphere(0.3, 128), glass(), at(0.8, 0.0, 0.7));
     let lamp = DVec3::new(0.8, 0.0, 0.7);
     made.light([2.0; 3], point(lamp));
-    agrees(&gpu, "lamp in a ball", &made, &[], |p| 2.0 * lamp.z / lamp.distance(p).powi(3));
+    agrees(&gpu, "lamp in a ball", &made, &[], |p| 2.0 * 2.25 * lamp.z / lamp.distance(p).powi(3));
 }
 
 /// Next event estimation finds light behind thin-walled glass and through holes. Photons that pass both leave the film
@@ -242,6 +315,4 @@ fn light_that_nothing_deflects_counts_once() {
     made.light([2.0; 3], point(DVec3::new(0.8, 0.0, 1.0)));
     let [off, on] = ["caustics=off", "caustics=photons:16384"].map(|rung| film(&gpu, &made.0, &[rung]));
     assert!(mean(&off) > 0.0 && bits(&off) == bits(&on), "{} and {}", mean(&off), mean(&on));
-    let other = Settings { architecture: Some(Architecture::Gpu), ..settings(&["caustics=photons:16384"]) };
-    assert!(bits(&gpu.shot(&made.0, None, other).1) == bits(&on), "the form for GPUs");
 }

@@ -162,7 +162,7 @@ HierarchyChoice descend_light_hierarchy(vec3 p, uint word, uint trail, bool want
         LightNode other = light_node_at((link & LIGHT_INDEX) + 1u);
         float of_one = node_importance(one, p);
         float of_other = node_importance(other, p);
-        // A child that may light the point keeps at least one word.
+        // A child that may light the point keeps at least one word of two or more.
         float share = of_one / max(of_one + of_other, 1e-37);
         uint split = max(uint(min(share * float(r.size), 4294967040.0)), of_one > 0.0 ? 1u : 0u);
         uint of_first = of_other > 0.0 ? min(split, r.size - 1u) : of_one > 0.0 ? r.size : 0u;

@@ -1,5 +1,5 @@
 // Photon tracing: each photon leaves a punctual light and follows smooth surfaces until it lands on one that scatters.
-// Next event estimation finds light that no surface deflects, so only photons that one has deflected land.
+// Next event estimation finds light that no surface deflects. So a photon lands only after a surface has deflected it.
 // Where to read: Jensen 2001, chapter 5; Veach 1997, section 5.3 (adjoint BSDF of shading normals); docs/decisions/paths.md.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -19,7 +19,7 @@ layout(push_constant) uniform Push { uint count; };
 const uint ROULETTE_FROM = 4;
 const float SURVIVES = 0.75;
 
-// Random numbers of all photons are one sequence, whose elements their lights' directions do not share.
+// The photons of a sample are the elements of one sequence for each surface and draw.
 uvec2 photon_words(uint photon, uint surface, uint draw) {
     return random_words(uvec2(trace_terms.sample_index, 0xffffu), surface * DIMENSION_PAIRS + draw, trace_terms.seed, photon);
 }
@@ -49,6 +49,7 @@ void main() {
     p.sum = vec3(0.0);
     bool deflected = false;
     float travelled = 0.0;
+    float index_at_light = index_of(present_medium(p.media));
     Landing landing = Landing(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
     for (uint surface = 0; surface <= trace_terms.interfaces && alive; surface++) {
         // 1. The next vertex.
@@ -68,14 +69,18 @@ void main() {
             landing.position = vertex.interaction.hit.s.p_bvh;
             landing.normal = vertex.interaction.hit.n;
             landing.to_light = -p.direction;
-            landing.power = p.throughput * light.color * (ray.measure * towards / share);
+            // Paths carry radiance divided by the square of the index of refraction, and lights give it to them.
+            float index_ratio = index_at_light / index_of(present_medium(p.media));
+            landing.power = p.throughput * light.color * (ray.measure * towards * index_ratio * index_ratio / share);
         }
-        alive = vertex.at_surface && !lobe && !vertex.interaction.hit.s.unlit;
+        alive = vertex.at_surface && !lobe && (vertex.passed_by || !vertex.interaction.hit.s.unlit);
         // 3. Or goes on.
         vec3 before = p.direction;
         bool straight = is_unscattered(vertex, drawn);
         p.throughput *= weight_of(vertex, drawn, drawn.weight);
-        if (!straight) p.throughput *= adjoint_weight(before, vertex.passed_by ? before : drawn.direction, vertex.interaction.hit.s.n, vertex.interaction.hit.n);
+        bool coat = CLEARCOAT && vertex.x < vertex.bsdf.layers.shares.x;
+        vec3 n = coat ? vertex.interaction.hit.s.n_coat : vertex.interaction.hit.s.n;
+        if (!straight) p.throughput *= adjoint_weight(before, vertex.passed_by ? before : drawn.direction, n, vertex.interaction.hit.n);
         deflected = deflected || !straight;
         leave(p, vertex, drawn, ray_origin(vertex.interaction.hit.s.p_bvh, vertex.interaction.hit.n, vertex.interaction.hit.s.v));
         if (surface >= ROULETTE_FROM) {

@@ -16,7 +16,7 @@ struct Landing {
     vec3 position;
     vec3 normal;   // of the triangle
     vec3 to_light; // unit vector to where it comes from
-    vec3 power;    // watts, or lumens: the unit of the light
+    vec3 power;    // lumens, or watts: the unit of the light; as if the light's medium were that of the landing
 };
 
 // A node of the bounding volume hierarchy over photons, in depth-first order.
@@ -31,12 +31,13 @@ struct PhotonNode {
 struct Photon {
     vec3 position;
     uint to_light;      // the direction that it comes from, octahedral in 2x16 bits
-    vec3 irradiance;    // that it brings at its position, on a plane perpendicular to its direction
+    vec3 irradiance;    // at the middle of its disk, the largest, on a plane perpendicular to its direction
     uint normal_radius; // the surface's normal, octahedral in 2x8 bits; upper half of a float: radius of the kernel in metres
 };
 
 const uint PHOTON_COUNT_BITS = 3;
-// Smallest cosine between the normals of two points that lie on one surface.
+// Smallest cosine between the normals of two points that lie on one surface. For neighbours of a photon sides differ; for a
+// vertex they do not, since the direction of light tells the side.
 const float SAME_SURFACE = 0.8;
 // Largest distance of a point from a photon's plane, in radii of its disk.
 const float DISK_THICKNESS = 0.25;

@@ -18,7 +18,7 @@ use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
 use crate::scene::lobe::{LOBES, SHEEN};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
 use crate::transport::emitters::bounded;
-use crate::transport::layers::{SMOOTHEST, is_smooth};
+use crate::transport::layers::{SMOOTHEST, deflects, is_smooth};
 
 /// Perceptual roughness up to which surfaces have screen-space reflections.
 const ROUGHEST_ON_SCREEN: f32 = 0.2;
@@ -398,15 +398,17 @@ impl Planner<'_> {
 
     /// Adds the photons of punctual lights to path tracing: no path reaches such a light by way of a smooth surface.
     fn caustics(&mut self, paths: Option<Paths>, lights: &Lights) -> Option<Paths> {
-        let Self { surfaces, decisions, knobs, .. } = self;
-        let deflects = |m: &Material| is_smooth(m) && (surfaces::mirrors(m) || m.ior != 1.0 || m.clearcoat > 0.0);
+        let Self { scene, surfaces, decisions, knobs, .. } = self;
         let cause = match (paths, lights.directional + lights.local) {
             (None, _) => Cause::against("path tracing is off"),
             (_, 0) => Cause::against("no punctual light shines"),
-            _ => surfaces.cause(deflects, |m| {
-                let does = if m.transmission > 0.0 { "refracts or reflects" } else { "reflects" };
-                format!("{does} the light of punctual lights specularly")
-            }),
+            _ => surfaces.cause(
+                |m| deflects(scene, m),
+                |m| {
+                    let does = if m.transmission > 0.0 { "refracts or reflects" } else { "reflects" };
+                    format!("{does} the light of punctual lights specularly")
+                },
+            ),
         };
         let photons = knobs.caustics.photons();
         let kept = decisions.decide_with(EffectId::Caustics, knobs.caustics.choice().allows(photons > 0), cause);

@@ -18,7 +18,7 @@ use crate::optics::fresnel::{fresnel_conductor, fresnel_dielectric, nested_f0, n
 use crate::optics::snell::{reflect, refract};
 use crate::scene::material::Material;
 use crate::scene::solid::{Solids, media_at};
-use crate::scene::{AlphaMode, Scene};
+use crate::scene::{AlphaMode, Scene, TextureRef};
 use crate::share::COAT_INDEX;
 pub use crate::share::MIN_ROUGHNESS as SMOOTHEST;
 
@@ -313,6 +313,22 @@ pub fn is_smooth(m: &Material) -> bool {
     let base = m.roughness <= SMOOTHEST && !m.has_direction() && (mirrors(m) || m.transmission > 0.0);
     let coat = m.clearcoat > 0.0 && m.clearcoat_roughness <= SMOOTHEST;
     !m.unlit && coverage(m).is_some_and(|share| share > 0.0) && (base || coat)
+}
+
+/// Whether a surface may deflect light by a delta lobe: some texel is smooth, of what reflects, of a coat, or of what
+/// refracts.
+#[must_use]
+pub fn deflects(scene: &Scene, m: &Material) -> bool {
+    // Roughness is in the green channel, and a texture scales the factor.
+    let smoothest = |factor: f32, texture: Option<TextureRef>| {
+        let texels = texture.filter(|_| factor > SMOOTHEST).map(|texture| &scene.images[texture.image].rgba);
+        let least = texels.and_then(|rgba| rgba.as_chunks::<4>().0.iter().map(|texel| texel[1]).min());
+        factor * least.map_or(1.0, |least| f32::from(least) / 255.0)
+    };
+    let bends = mirrors(m) || (m.transmission > 0.0 && m.ior != 1.0);
+    let base = bends && !m.has_direction() && smoothest(m.roughness, m.metallic_roughness_texture) <= SMOOTHEST;
+    let coat = m.clearcoat > 0.0 && smoothest(m.clearcoat_roughness, m.clearcoat_roughness_texture) <= SMOOTHEST;
+    !m.unlit && coverage(m) != Some(0.0) && (base || coat)
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ impl PhotonRandom {
         Self(number)
     }
 
-    fn word(&mut self) -> u64 {
+    pub(super) fn word(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -233,7 +233,7 @@ impl PhotonWorld<'_> {
 }
 
 /// Whether an instance only scatters: it is opaque, and no layer has a specular lobe.
-pub(super) fn is_diffuse(scene: &Scene, solids: &Solids, instance: usize) -> bool {
+fn is_diffuse(scene: &Scene, solids: &Solids, instance: usize) -> bool {
     let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
     !solids.solid[instance] && coverage(material) == Some(1.0) && !is_smooth(material)
 }

@@ -2,7 +2,7 @@
 //!
 //! Read Jensen 2001, "Realistic Image Synthesis Using Photon Mapping"; Silverman 1986, "Density Estimation for Statistics
 //! and Data Analysis", section 5.3; docs/decisions/paths.md. No path from the eye reaches a punctual light by way of a
-//! smooth surface: the light has no area, and the surface one direction. Photons do. The host chooses rays that leave
+//! smooth surface: the chance to meet a light without an area is 0. Photons do. The host chooses rays that leave
 //! the lights towards smooth surfaces; the device traces them (shaders/pass/trace_photons.comp), so that materials have
 //! one implementation. Then the host spreads each landed photon over a disk and builds a bounding volume hierarchy
 //! over the disks, in which path vertices look up (shaders/lib/photon_map.glsl). Coordinates are in bvh space, metres.
@@ -13,10 +13,11 @@ use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::aabb::Aabb;
-use super::bvh::Bvh;
+use super::bvh::{Bvh, Triangle};
+use super::layers::{coverage, deflects};
 use super::line;
 use super::octahedral::{octahedral_from_unit, pack_snorm_2x8, pack_snorm_2x16};
-use super::photon_guiding::{PhotonRandom, is_diffuse};
+use super::photon_guiding::PhotonRandom;
 use crate::scene::solid::Solids;
 use crate::scene::{Extent, Light, LightKind, Scene};
 use crate::share::{DISK_THICKNESS, Landing, PHOTON_COUNT_BITS, Photon, PhotonNode, PhotonRay, SAME_SURFACE};
@@ -26,13 +27,15 @@ const NEIGHBOURS: usize = 8;
 /// Largest number of photons in a leaf.
 const LEAF: usize = 4;
 const _: () = assert!(LEAF < 1 << PHOTON_COUNT_BITS);
-/// Largest radius of a disk, and smallest, relative to the radius of the scene.
+/// Smallest and largest radius of a disk, relative to the radius of the scene.
 const RADII: [f64; 2] = [1e-6, 0.1];
 /// Smallest cosine of incidence of a photon: its irradiance perpendicular to its direction is its power over it.
 const GRAZING: f64 = 1e-3;
-/// Rays that look for smooth surfaces, over all lights, and cells of a light's directions along each side.
+/// Rays that look for smooth surfaces, over all lights.
 const PILOT_RAYS: usize = 1 << 18;
+/// Such rays in each cell of a light's directions.
 const PILOTS_IN_CELL: usize = 4;
+/// Largest number of cells along each side of the square of a light's directions.
 const MOST_CELLS: usize = 128;
 
 /// Element `i` of a sequence that fills the unit square evenly (R2; Roberts 2018): additive recurrence by powers of the
@@ -123,6 +126,28 @@ impl Source {
     }
 }
 
+/// What the surface of an instance does to photons.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Surface {
+    /// Some of it is smooth.
+    Deflects,
+    /// Photons may pass it.
+    Passes,
+    /// It is opaque, and nowhere smooth.
+    Ends,
+}
+
+impl Surface {
+    fn of(scene: &Scene, solids: &Solids, instance: usize) -> Self {
+        let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
+        match (deflects(scene, material), coverage(material)) {
+            (true, _) => Self::Deflects,
+            (false, Some(1.0)) if material.transmission == 0.0 && !solids.solid[instance] => Self::Ends,
+            _ => Self::Passes,
+        }
+    }
+}
+
 /// The cells of a source's square that smooth surfaces may lie in.
 struct Cells {
     side: usize,
@@ -133,24 +158,34 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(source: &Source, bvh: &Bvh, diffuse: &[bool], side: usize, least: f64) -> Self {
-        let mut seen = vec![false; side * side];
+    fn of(source: &Source, bvh: &Bvh, surfaces: &[Surface], side: usize, least: f64) -> Self {
+        // From a light with an area a small surface is seen in other directions at each of its points.
+        let mut seen = vec![source.extent.is_some(); side * side];
         let cell = |at: DVec2| (at.x * side as f64) as usize + side * (at.y * side as f64) as usize;
+        let of = |triangle: &Triangle| surfaces[triangle.instance as usize];
         // Large surfaces are met by rays through each cell.
         for (place, seen) in seen.iter_mut().enumerate() {
             let corner = DVec2::new((place % side) as f64, (place / side) as f64);
-            *seen = (0..PILOTS_IN_CELL).any(|i| {
+            *seen |= (0..PILOTS_IN_CELL).any(|i| {
                 let number = (place * PILOTS_IN_CELL + i) as u64;
                 let at = (corner + evenly(number)) / side as f64;
                 let (origin, direction, _) = source.ray(at, evenly(number ^ 1));
-                line::nearest(bvh, origin, direction, least).is_some_and(|met| !diffuse[met.triangle.instance as usize])
+                line::nearest(bvh, origin, direction, least).is_some_and(|met| of(met.triangle) != Surface::Ends)
             });
         }
-        // Small ones may lie between the rays; their corners tell the cell.
-        for triangle in bvh.triangles.iter().filter(|triangle| !diffuse[triangle.instance as usize]) {
-            for corner in triangle.corners {
-                if let Some(at) = source.place(Vec3::from(corner).as_dvec3()) {
-                    seen[cell(at)] = true;
+        // Small and thin ones may lie between the rays; points along their edges tell the cells.
+        for triangle in bvh.triangles.iter().filter(|triangle| of(triangle) == Surface::Deflects) {
+            let corners = triangle.corners.map(|corner| Vec3::from(corner).as_dvec3());
+            for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
+                let across = match [from, to].map(|corner| source.place(corner)) {
+                    [Some(one), Some(other)] => (one - other).abs().max_element(),
+                    _ => 1.0,
+                };
+                let steps = (2.0 * across * side as f64).ceil().max(1.0);
+                for i in 0..steps as usize {
+                    if let Some(at) = source.place(from.lerp(to, i as f64 / steps)) {
+                        seen[cell(at)] = true;
+                    }
                 }
             }
         }
@@ -226,14 +261,14 @@ impl PhotonEmission {
         let bounds = bvh.nodes.first()?.bounds();
         let [low, high] = [bounds.min, bounds.max].map(|corner| Vec3::from(corner).as_dvec3());
         let (middle, radius) = ((low + high) * 0.5, 0.5 * (high - low).length());
-        let diffuse: Vec<bool> = (0..scene.instances.len()).map(|i| is_diffuse(scene, solids, i)).collect();
+        let surfaces: Vec<Surface> = (0..scene.instances.len()).map(|i| Surface::of(scene, solids, i)).collect();
         let side = (PILOT_RAYS / PILOTS_IN_CELL / scene.lights.len().max(1)).isqrt().clamp(8, MOST_CELLS);
         let sought: Vec<(Source, Cells, f64)> = scene
             .lights
             .par_iter()
             .map(|light| {
                 let source = Source::new(light, shaped, bvh.anchor, (middle, radius));
-                let cells = Cells::of(&source, bvh, &diffuse, side, RADII[0] * radius);
+                let cells = Cells::of(&source, bvh, &surfaces, side, RADII[0] * radius);
                 let power = light.color.iter().map(|&c| f64::from(c)).sum::<f64>() * source.measure * cells.share();
                 (source, cells, power)
             })
@@ -243,8 +278,8 @@ impl PhotonEmission {
             let of_light = f64::from(count) * power / all;
             let points = if power > 0.0 { (of_light * cells.around() / cells.share()).ceil() as u64 } else { 0 };
             let media = match light.kind {
-                LightKind::Directional { .. } => [0; 4],
-                LightKind::Point { position, .. } | LightKind::Spot { position, .. } => media(position),
+                LightKind::Point { position, .. } | LightKind::Spot { position, .. } if points > 0 => media(position),
+                _ => [0; 4],
             };
             PhotonSource { source, cells, points, media }
         };
@@ -260,11 +295,12 @@ impl PhotonEmission {
         for (index, PhotonSource { source, cells, points, media }) in self.lights.iter().enumerate() {
             // The same points, shifted (Cranley and Patterson 1976), at which they are as even.
             let shift = DVec2::new(random.unit(), random.unit());
+            let of_light = random.word();
             let ray = |i: u64| {
                 let at = evenly(i) + shift;
                 let at =
                     cells.corner + cells.size * (at - DVec2::select(at.cmpge(DVec2::ONE), DVec2::ONE, DVec2::ZERO));
-                let mut place = PhotonRandom::new(number ^ i << 32);
+                let mut place = PhotonRandom::new(of_light ^ i);
                 let (origin, direction, cosine) =
                     cells.contains(at).then(|| source.ray(at, DVec2::new(place.unit(), place.unit())))?;
                 Some(PhotonRay {

@@ -474,7 +474,7 @@ knob! {
 
 macro_rules! caustics_about {
     ($photons:literal) => {
-        concat!($photons, " photons for each sample of a pixel bring the light, blurred between them.")
+        concat!($photons, " photons in each sample of the picture; their light is blurred over the gaps between them.")
     };
 }
 
