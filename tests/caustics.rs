@@ -54,9 +54,9 @@ fn radiance(camera: &Camera, irradiance: impl Fn(DVec3) -> f64) -> f64 {
     sum / f64::from(SIDE * SIDE) * f64::from(ALBEDO) / std::f64::consts::PI
 }
 
-/// Largest relative error of a mean over the pixels: noise of photons. The window shows two disks and more, in at least 16
-/// sets, and the weight in a disk of eight photons at random places deviates by 0.41: 0.41/√32 = 7 %. Photons lie more
-/// evenly, so that half of it is asked; 1.5 % is the most that was found.
+/// Largest relative error of a mean over the pixels: noise of photons. The window shows two disks and more, in at least
+/// 16 sets, and the weight in a disk of eight photons at random places deviates by 0.41: 0.41/√32 = 7 %. Photons lie
+/// more evenly, so that half of it is asked; 1.5 % is the most that was found.
 const WITHIN: f64 = 0.035;
 
 /// Compares the floor's mean radiance with what is expected. Without photons it is dark.
@@ -225,8 +225,8 @@ fn a_ball_of_glass_is_the_lens_that_it_is() {
     agrees(&gpu, "ball", &made, &["samples=64", "caustics=photons:65536"], of);
 }
 
-/// Radiance is n² times as large in a medium of index n. The eye above sees the floor below as dark as the square of the
-/// index makes it.
+/// Radiance is n² times as large in a medium of index n. The eye above sees the floor below as dark as the square of
+/// the index makes it.
 #[test]
 fn the_sun_lights_a_floor_under_water() {
     let gpu = Gpu::open();

@@ -1,5 +1,5 @@
-//! The light hierarchy of path tracing: its probabilities sum to 1, no light is lost, the mean of the picture is that of
-//! light sampling by power, and the error is smaller where many lights are far apart.
+//! The light hierarchy of path tracing: its probabilities sum to 1, no light is lost, the mean of the picture is that
+//! of light sampling by power, and the error is smaller where many lights are far apart.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -248,6 +248,7 @@ fn importance_on_the_device_gives_the_same_probabilities() {
                 let found = hierarchy.probability(i, on_device);
                 let twin = hierarchy.probability(i, |node| LightHierarchy::importance(node, point.as_dvec3()));
                 sum += found;
+                assert!(twin == 0.0 || found > 0.0, "{}: light {i} is lost at {point}", made.0.name);
                 assert!((found - twin).abs() < 4e-3, "{} at {point}: {found}, {twin}", made.0.name);
             }
             assert!((sum - 1.0).abs() < 1e-12, "{sum}");
@@ -278,8 +279,8 @@ fn many_points_light_alike_by_both_samplers() {
     }
 }
 
-/// A ceiling of 36 panels, with a pane just below it. From the floor all panels are about as important; from the pane it
-/// is those at the same place.
+/// A ceiling of 36 panels, with a pane just below it. From the floor all panels are about as important; from the pane
+/// it is those at the same place.
 fn ceiling() -> Made {
     let mut made = Made::new("ceiling");
     made.add(Shape::panel(6.0, 6.0), lambert([0.7; 3]), DAffine3::from_rotation_x(-FRAC_PI_2));
@@ -293,7 +294,8 @@ fn ceiling() -> Made {
     made
 }
 
-/// Paths pass the pane undeflected before they hit a panel, so that the last vertex for MIS is not where the ray starts.
+/// Paths pass the pane undeflected before they hit a panel, so that the last vertex for MIS is not where the ray
+/// starts.
 #[test]
 fn panels_behind_a_pane_light_alike_by_both_samplers() {
     let gpu = Gpu::open();

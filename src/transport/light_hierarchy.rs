@@ -1,10 +1,10 @@
 //! The light hierarchy: a binary tree over the emitters that have a place, from which path tracing chooses one by its
 //! importance at the shaded point.
 //!
-//! Read Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting"; pbrt (4th ed.),
-//! section 12.6.3 (BVH light sampling). A node bounds its emitters: a sphere for their positions, an orientation
-//! cone, and the sum of their intensities. `descend_light_hierarchy` of shaders/lib/emitters.glsl walks from the
-//! root to a leaf and chooses between two children in proportion to their importance.
+//! Read Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting"; pbrt (4th
+//! ed.), section 12.6.3 (BVH light sampling). A node bounds its emitters: a sphere for their positions, an orientation
+//! cone, and the sum of their intensities. `descend_light_hierarchy` of shaders/lib/emitters.glsl walks from the root
+//! to a leaf and chooses between two children in proportion to their importance.
 //!
 //! Assumes: bvh space, metres. Nodes are stored as the device reads them, rounded so that they still bound.
 
@@ -34,8 +34,8 @@ const LEAST: f64 = 1.0 / 4_294_967_296.0;
 pub struct LightHierarchy {
     /// Index of the first emitter that has a place; those before it are infinitely far.
     pub first: usize,
-    /// The root, then pairs of siblings. A leaf holds the index of its emitter plus 1, because the table of emitters has
-    /// the bin of the hierarchy before them.
+    /// The root, then pairs of siblings. A leaf holds the index of its emitter plus 1, because the table of emitters
+    /// has the bin of the hierarchy before them.
     pub nodes: Vec<LightNode>,
     /// For each emitter the way from the root: one bit for each node, the first one lowest, below a 1. 0: not in the
     /// hierarchy.
@@ -122,8 +122,8 @@ impl LightBounds {
         }
     }
 
-    /// Cost of the surface area orientation heuristic (Conty Estevez and Kulla 2018, section 4.2), with the square of the
-    /// diagonal for the surface area: importance sees a sphere, and the box of a row of lights has no area.
+    /// Cost of the surface area orientation heuristic (Conty Estevez and Kulla 2018, section 4.2), with the square of
+    /// the diagonal for the surface area: importance sees a sphere, and the box of a row of lights has no area.
     fn cost(&self) -> f64 {
         let end = (self.spread + self.reach).min(PI);
         let (sin, cos) = self.spread.sin_cos();
@@ -154,8 +154,8 @@ fn joined_cones((one, one_angle): (DVec3, f64), (other, other_angle): (DVec3, f6
 
 impl LightHierarchy {
     /// The hierarchy over the emitters that have a place. `corners` gives the corners of a triangle of the scene in bvh
-    /// space, counter-clockwise around its front; `None`: the triangle is degenerate and no light. Directional lights are
-    /// the first ones of `lights`.
+    /// space, counter-clockwise around its front; `None`: the triangle is degenerate and no light. Directional lights
+    /// are the first ones of `lights`.
     #[must_use]
     pub fn of(
         emitters: &Emitters,

@@ -1,11 +1,12 @@
 //! The photon map: photons of punctual lights that smooth surfaces deflect, and the density of those that landed.
 //!
-//! Read Jensen 2001, "Realistic Image Synthesis Using Photon Mapping"; Silverman 1986, "Density Estimation for Statistics
-//! and Data Analysis", section 5.3; docs/decisions/paths.md. No path from the eye reaches a punctual light by way of a
-//! smooth surface: the chance to meet a light without an area is 0. Photons do. The host chooses rays that leave
-//! the lights towards smooth surfaces; the device traces them (shaders/pass/trace_photons.comp), so that materials have
-//! one implementation. Then the host spreads each landed photon over a disk and builds a bounding volume hierarchy
-//! over the disks, in which path vertices look up (shaders/lib/photon_map.glsl). Coordinates are in bvh space, metres.
+//! Read Jensen 2001, "Realistic Image Synthesis Using Photon Mapping"; Silverman 1986, "Density Estimation for
+//! Statistics and Data Analysis", section 5.3; docs/decisions/paths.md. No path from the eye reaches a punctual light
+//! by way of a smooth surface: the chance to meet a light without an area is 0. Photons do. The host chooses rays that
+//! leave the lights towards smooth surfaces; the device traces them (shaders/pass/trace_photons.comp), so that
+//! materials have one implementation. Then the host spreads each landed photon over a disk and builds a bounding volume
+//! hierarchy over the disks, in which path vertices look up (shaders/lib/photon_map.glsl). Coordinates are in bvh
+//! space, metres.
 
 use std::f64::consts::{PI, TAU};
 

@@ -474,13 +474,13 @@ knob! {
 
 macro_rules! caustics_about {
     ($photons:literal) => {
-        concat!($photons, " photons in each sample of the picture; their light is blurred over the gaps between them.")
+        concat!($photons, " photons in each sample; their light is blurred over the gaps between them.")
     };
 }
 
 knob! {
     Caustics = "caustics" {
-        /// Where a smooth surface bends or mirrors the light of a point, it does not arrive: shadows behind glass are dark.
+        /// Light of a point that a smooth surface bends or mirrors does not arrive: shadows behind glass are dark.
         Off = "off",
         #[doc = caustics_about!("4 thousand")]
         Photons4096 = "photons:4096",
