@@ -482,11 +482,11 @@ knob! {
     Caustics = "caustics" {
         /// Light of a point that a smooth surface bends or mirrors does not arrive: shadows behind glass are dark.
         Off = "off",
-        #[doc = caustics_about!("4 thousand")]
+        #[doc = caustics_about!(4096)]
         Photons4096 = "photons:4096",
-        #[doc = caustics_about!("16 thousand")]
+        #[doc = caustics_about!(16384)]
         Photons16384 = "photons:16384",
-        #[doc = caustics_about!("65 thousand")]
+        #[doc = caustics_about!(65536)]
         Photons65536 = "photons:65536",
     }
     presets: [Off, Off, Photons16384],
