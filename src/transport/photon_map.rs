@@ -129,7 +129,7 @@ impl Source {
 
 /// What the surface of an instance does to photons.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Surface {
+enum PhotonSurface {
     /// Some of it is smooth.
     Deflects,
     /// Photons may pass it.
@@ -138,7 +138,7 @@ enum Surface {
     Ends,
 }
 
-impl Surface {
+impl PhotonSurface {
     fn of(scene: &Scene, solids: &Solids, instance: usize) -> Self {
         let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
         match (deflects(scene, material), coverage(material)) {
@@ -159,7 +159,7 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(source: &Source, bvh: &Bvh, surfaces: &[Surface], side: usize, least: f64) -> Self {
+    fn of(source: &Source, bvh: &Bvh, surfaces: &[PhotonSurface], side: usize, least: f64) -> Self {
         // From a light with an area a small surface is seen in other directions at each of its points.
         let mut seen = vec![source.extent.is_some(); side * side];
         let cell = |at: DVec2| (at.x * side as f64) as usize + side * (at.y * side as f64) as usize;
@@ -171,11 +171,11 @@ impl Cells {
                 let number = (place * PILOTS_IN_CELL + i) as u64;
                 let at = (corner + evenly(number)) / side as f64;
                 let (origin, direction, _) = source.ray(at, evenly(number ^ 1));
-                line::nearest(bvh, origin, direction, least).is_some_and(|met| of(met.triangle) != Surface::Ends)
+                line::nearest(bvh, origin, direction, least).is_some_and(|met| of(met.triangle) != PhotonSurface::Ends)
             });
         }
         // Small and thin ones may lie between the rays; points along their edges tell the cells.
-        for triangle in bvh.triangles.iter().filter(|triangle| of(triangle) == Surface::Deflects) {
+        for triangle in bvh.triangles.iter().filter(|triangle| of(triangle) == PhotonSurface::Deflects) {
             let corners = triangle.corners.map(|corner| Vec3::from(corner).as_dvec3());
             for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
                 let across = match [from, to].map(|corner| source.place(corner)) {
@@ -262,7 +262,8 @@ impl PhotonEmission {
         let bounds = bvh.nodes.first()?.bounds();
         let [low, high] = [bounds.min, bounds.max].map(|corner| Vec3::from(corner).as_dvec3());
         let (middle, radius) = ((low + high) * 0.5, 0.5 * (high - low).length());
-        let surfaces: Vec<Surface> = (0..scene.instances.len()).map(|i| Surface::of(scene, solids, i)).collect();
+        let surfaces: Vec<PhotonSurface> =
+            (0..scene.instances.len()).map(|i| PhotonSurface::of(scene, solids, i)).collect();
         let side = (PILOT_RAYS / PILOTS_IN_CELL / scene.lights.len().max(1)).isqrt().clamp(8, MOST_CELLS);
         let sought: Vec<(Source, Cells, f64)> = scene
             .lights
@@ -466,4 +467,95 @@ fn spread(landing: &Landing, radius: f64) -> (Photon, Aabb) {
     let half = (flat + normal.abs() * f64::from(DISK_THICKNESS)) * radius * 1.001;
     let corner = |side: f64| (position + half * side).as_vec3().to_array();
     (photon, Aabb { min: corner(-1.0), max: corner(1.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Photons on a floor and on a wall, denser towards their common edge, and three at one place.
+    fn landings() -> Vec<Landing> {
+        let mut random = PhotonRandom::new(1);
+        let mut landing = |i: u32| {
+            let [along, near, tilt] = [random.unit(), random.unit().powi(3), random.unit()];
+            let (position, normal) = match i % 3 {
+                0 => (DVec3::new(along, near, 0.0), DVec3::Z),
+                _ => (DVec3::new(along, 0.0, near), DVec3::Y),
+            };
+            Landing {
+                position: position.as_vec3().to_array(),
+                normal: normal.as_vec3().to_array(),
+                to_light: (normal + DVec3::X * tilt).normalize().as_vec3().to_array(),
+                power: [1.0, 0.5, tilt as f32],
+            }
+        };
+        let mut all: Vec<Landing> = (0..500).map(&mut landing).collect();
+        all.extend([all[7]; 2]);
+        all
+    }
+
+    #[test]
+    fn neighbours_are_the_nearest_on_the_same_surface() {
+        let tree = PhotonTree::of(landings());
+        for photon in &tree.photons {
+            let [position, normal] = [photon.position, photon.normal].map(Vec3::from);
+            let same = tree.photons.iter().filter(|other| normal.dot(Vec3::from(other.normal)) >= SAME_SURFACE);
+            let mut all: Vec<f32> = same.map(|other| position.distance_squared(Vec3::from(other.position))).collect();
+            all.sort_by(f32::total_cmp);
+            assert_eq!(tree.distance_of_neighbours(photon), f64::from(all[NEIGHBOURS]).sqrt());
+        }
+        let few = PhotonTree::of(landings()[..NEIGHBOURS].to_vec());
+        assert_eq!(few.distance_of_neighbours(&few.photons[0]), f64::INFINITY);
+    }
+
+    /// The look-up of shaders/lib/photon_map.glsl: places of the photons in the leaves whose boxes hold a point.
+    fn found(texels: &[[u32; 4]], p: Vec3) -> Vec<usize> {
+        let node = |at: u32| -> PhotonNode { bytemuck::cast([texels[2 * at as usize], texels[2 * at as usize + 1]]) };
+        let (mut at, end, mut places) = (0, node(0).next, Vec::new());
+        while at < end {
+            let PhotonNode { low, next, high, photons } = node(at);
+            let inside = p.cmpge(low.into()).all() && p.cmple(high.into()).all();
+            let count = photons & ((1 << PHOTON_COUNT_BITS) - 1);
+            let first = photons >> PHOTON_COUNT_BITS;
+            places.extend((first..first + if inside { count } else { 0 }).map(|place| place as usize));
+            at = if inside { at + 1 } else { next };
+        }
+        places
+    }
+
+    #[test]
+    fn a_look_up_finds_every_disk_that_covers_the_point() {
+        let texels = photon_map(&landings(), 1.0);
+        let behind = texels.len() / 2 - landings().len();
+        let photon = |place: usize| -> Photon { bytemuck::cast([texels[2 * place], texels[2 * place + 1]]) };
+        for i in 0..200_u64 {
+            let at = evenly(i);
+            let p = if i % 2 == 0 { at.extend(0.0) } else { DVec3::new(at.x, 0.0, at.y) }.as_vec3();
+            let found = found(&texels, p);
+            for place in behind..texels.len() / 2 {
+                let Photon { position, normal_radius, .. } = photon(place);
+                let radius = f32::from_bits(normal_radius & 0xffff_0000);
+                let covers = p.distance(Vec3::from(position)) < DISK_THICKNESS * radius;
+                assert!(!covers || found.contains(&place), "photon {place} at {p}");
+            }
+        }
+        assert_eq!(found(&photon_map(&[], 1.0), Vec3::ZERO), [0; 0]);
+    }
+
+    /// Over its disk the irradiance of a photon adds up to its power.
+    #[test]
+    fn disks_have_the_power_of_their_photons() {
+        for landing in landings() {
+            for radius in [1e-4, 0.03, 7.0] {
+                let (photon, _) = spread(&landing, radius);
+                let [normal, to_light] = [landing.normal, landing.to_light].map(|v| Vec3::from(v).as_dvec3());
+                let radius = f64::from(f32::from_bits(photon.normal_radius & 0xffff_0000));
+                // Half of the peak, over the area.
+                let area = 0.5 * PI * radius * radius * normal.dot(to_light);
+                for (power, peak) in landing.power.iter().zip(photon.irradiance) {
+                    assert!((f64::from(peak) * area - f64::from(*power)).abs() < 1e-6, "{power}");
+                }
+            }
+        }
+    }
 }

@@ -333,7 +333,8 @@ fn every_knob_turns_while_pictures_are_drawn() {
         }
     }
     assert!(turned > 60, "{turned} rungs");
-    // What cannot be drawn quickly is small while it moves, and whole once it rests.
+    // What cannot be drawn quickly is small while it moves, and whole once it rests. It is small at once where the time
+    // of a pixel is known of a picture that had to be compiled.
     let last = settings(&Knobs::of(Model::Recursive));
     let last = Settings { size: [480, 270], ..last };
     shared.want(|wanted| (wanted.settings, wanted.moving) = (last.clone(), true));
@@ -348,7 +349,7 @@ fn every_knob_turns_while_pictures_are_drawn() {
             let _ = woken.recv_timeout(Duration::from_millis(200));
         }
     };
-    wait("moving", &|seen| seen.shown().is_some_and(|shown| shown.moving && shown.size[0] > 64));
+    wait("moving", &|seen| seen.shown().is_some_and(|shown| shown.moving && shown.size != size));
     // By now it is known how long a pixel takes.
     let mut aside = scene().cameras[0].clone();
     aside.world_from_camera.translation.x += 0.1;
