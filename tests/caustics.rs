@@ -100,6 +100,20 @@ fn a_mirror_sends_the_light_of_a_point_as_its_image_would() {
         made
     };
     agrees(&gpu, "mirror", &room(1.2), &[], |p| 2.0 * image.z / image.distance(p).powi(3));
+    // Each band of wavelengths has photons of its own.
+    let mut coloured = room(1.2);
+    coloured.0.lights[0].color = [1.0, 2.0, 1.0];
+    agrees(&gpu, "by wavelengths", &coloured, &["colour=spectral:8"], |p| 2.0 * image.z / image.distance(p).powi(3));
+    // A soft cone and a range: both of the whole way.
+    let mut soft = room(1.2);
+    let (position, direction) = (DVec3::new(0.8, 0.0, 0.5), DVec3::Z);
+    soft.0.lights[0].kind = LightKind::Spot { position, direction, range: Some(2.5), inner: 0.2, outer: 1.2 };
+    agrees(&gpu, "soft cone with a range", &soft, &[], |p| {
+        let distance = image.distance(p);
+        let cos = image.z / distance;
+        let ramp = (cos - 1.2_f64.cos()) / (0.2_f64.cos() - 1.2_f64.cos());
+        2.0 * cos / (distance * distance) * ramp.clamp(0.0, 1.0).powi(2) * (1.0 - (distance / 2.5).powi(4))
+    });
     // The floor is at 39 degrees from the image, outside of this cone.
     let [dark, bright] = [0.3, 1.2].map(|outer| mean(&film(&gpu, &room(outer).0, &[])));
     assert!(dark <= 1e-3 * bright, "{dark} beside the cone, {bright} in it");
