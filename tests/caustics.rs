@@ -7,7 +7,7 @@ use etalon::image::Picture;
 use etalon::plan::{Architecture, Knobs, Model};
 use etalon::scene::{Camera, Extent, Image, LightKind, Material, Sampler, Scene, TextureRef};
 use etalon::study::shape::Shape;
-use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::gpu::{Gpu, bits, spread};
 use etalon_testing::made::{Made, at, lambert, orthographic};
 use etalon_testing::raycast::camera_ray;
 use glam::{DAffine3, DVec3};
@@ -27,7 +27,7 @@ fn film(gpu: &Gpu, scene: &Scene, choices: &[&str]) -> Picture {
 }
 
 fn mean(picture: &Picture) -> f64 {
-    picture.rgba.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>() / picture.rgba.len() as f64
+    spread(picture, 1)[0]
 }
 
 /// Albedo of floors: so dark that light which they send back to glass and mirrors is below 1e-3 of what arrives.
@@ -86,31 +86,47 @@ fn fresnel(cos: f64, n: f64) -> (f64, f64) {
     (0.5 * (s * s + p * p), behind)
 }
 
+fn mirror() -> Material {
+    Material { metallic: 1.0, roughness: 0.0, specular: 1.0, double_sided: false, ..lambert([1.0; 3]) }
+}
+
+/// Faces down at z = 0.
+fn face_down() -> DAffine3 {
+    DAffine3::from_rotation_x(std::f64::consts::PI)
+}
+
+/// Where the mirror of the next scene shows its lamp.
+const IMAGE: DVec3 = DVec3::new(0.8, 0.0, 1.5);
+
+/// A mirror at z = 1 above the floor, and a lamp that shines up to it from z = 0.5, in a cone of `outer` rad.
+fn below_a_mirror(mirror: Material, outer: f64) -> Made {
+    let mut made = floor(SEEN, DVec3::Z * 0.9, 0.2);
+    made.add(Shape::panel(6.0, 6.0), mirror, at(0.0, 0.0, 1.0) * face_down());
+    let (position, direction) = (DVec3::new(0.8, 0.0, 0.5), DVec3::Z);
+    made.light([2.0; 3], LightKind::Spot { position, direction, range: None, inner: outer - 1e-3, outer });
+    made
+}
+
+fn of_the_image(p: DVec3) -> f64 {
+    2.0 * IMAGE.z / IMAGE.distance(p).powi(3)
+}
+
 #[test]
 fn a_mirror_sends_the_light_of_a_point_as_its_image_would() {
     let gpu = Gpu::open();
-    let mirror = Material { metallic: 1.0, roughness: 0.0, specular: 1.0, double_sided: false, ..lambert([1.0; 3]) };
-    let down = DAffine3::from_translation(DVec3::Z) * DAffine3::from_rotation_x(std::f64::consts::PI);
-    let image = DVec3::new(0.8, 0.0, 1.5);
-    let room = |outer: f64| {
-        let mut made = floor(SEEN, DVec3::Z * 0.9, 0.2);
-        made.add(Shape::panel(6.0, 6.0), mirror.clone(), down);
-        let (position, direction) = (DVec3::new(0.8, 0.0, 0.5), DVec3::Z);
-        made.light([2.0; 3], LightKind::Spot { position, direction, range: None, inner: outer - 1e-3, outer });
-        made
-    };
-    agrees(&gpu, "mirror", &room(1.2), &[], |p| 2.0 * image.z / image.distance(p).powi(3));
+    let room = |outer: f64| below_a_mirror(mirror(), outer);
+    agrees(&gpu, "mirror", &room(1.2), &[], of_the_image);
     // Each band of wavelengths has photons of its own.
     let mut coloured = room(1.2);
     coloured.0.lights[0].color = [1.0, 2.0, 1.0];
-    agrees(&gpu, "by wavelengths", &coloured, &["colour=spectral:8"], |p| 2.0 * image.z / image.distance(p).powi(3));
+    agrees(&gpu, "mirror, eight bands", &coloured, &["colour=spectral:8"], of_the_image);
     // A soft cone and a range: both of the whole way.
     let mut soft = room(1.2);
     let (position, direction) = (DVec3::new(0.8, 0.0, 0.5), DVec3::Z);
     soft.0.lights[0].kind = LightKind::Spot { position, direction, range: Some(2.5), inner: 0.2, outer: 1.2 };
     agrees(&gpu, "soft cone with a range", &soft, &[], |p| {
-        let distance = image.distance(p);
-        let cos = image.z / distance;
+        let distance = IMAGE.distance(p);
+        let cos = IMAGE.z / distance;
         let ramp = (cos - 1.2_f64.cos()) / (0.2_f64.cos() - 1.2_f64.cos());
         2.0 * cos / (distance * distance) * ramp.clamp(0.0, 1.0).powi(2) * (1.0 - (distance / 2.5).powi(4))
     });
@@ -255,22 +271,17 @@ fn the_sun_lights_a_floor_under_water() {
 #[test]
 fn smooth_texels_deflect_light() {
     let gpu = Gpu::open();
-    let mut made = floor(SEEN, DVec3::Z * 0.9, 0.2);
+    let uv_transform = glam::Affine2::IDENTITY;
+    let texture = TextureRef { image: 0, uv_set: 0, uv_transform, sampler: Sampler::default() };
+    let textured = Material { metallic_roughness_texture: Some(texture), roughness: 1.0, ..mirror() };
+    let mut made = below_a_mirror(textured, 1.2);
     made.0.images.push(Image {
         name: "smooth metal".to_owned(),
         width: 1,
         height: 1,
         rgba: vec![255, 0, 255, 255].into(),
     });
-    let uv_transform = glam::Affine2::IDENTITY;
-    let texture = TextureRef { image: 0, uv_set: 0, uv_transform, sampler: Sampler::default() };
-    let mirror = Material { metallic: 1.0, metallic_roughness_texture: Some(texture), ..lambert([1.0; 3]) };
-    let down = DAffine3::from_translation(DVec3::Z) * DAffine3::from_rotation_x(std::f64::consts::PI);
-    made.add(Shape::panel(6.0, 6.0), Material { specular: 1.0, double_sided: false, ..mirror }, down);
-    let (position, direction) = (DVec3::new(0.8, 0.0, 0.5), DVec3::Z);
-    made.light([2.0; 3], LightKind::Spot { position, direction, range: None, inner: 1.199, outer: 1.2 });
-    let image = DVec3::new(0.8, 0.0, 1.5);
-    agrees(&gpu, "textured mirror", &made, &[], |p| 2.0 * image.z / image.distance(p).powi(3));
+    agrees(&gpu, "textured mirror", &made, &[], of_the_image);
 }
 
 /// A disk light that faces a ball ten times smaller: each point of the disk has a caustic of its own.
@@ -279,11 +290,9 @@ fn lights_with_an_area_send_photons_from_all_of_it() {
     let gpu = Gpu::open();
     let right = std::f64::consts::FRAC_PI_2;
     let image = DVec3::new(0.0, 0.0, 3.5);
-    let mirror = Material { metallic: 1.0, roughness: 0.0, specular: 1.0, double_sided: false, ..lambert([1.0; 3]) };
-    let down = DAffine3::from_translation(DVec3::Z * 2.0) * DAffine3::from_rotation_x(std::f64::consts::PI);
     // The camera sees the floor beside the disk, which casts no shadow.
     let mut made = floor(DVec3::new(0.1, 0.0, 0.0), DVec3::new(-2.0, 0.0, 1.6), 0.05);
-    made.add(Shape::panel(0.3, 0.3), mirror, down);
+    made.add(Shape::panel(0.3, 0.3), mirror(), at(0.0, 0.0, 2.0) * face_down());
     let (position, direction) = (DVec3::Z * 0.5, DVec3::Z);
     let kind = LightKind::Spot { position, direction, range: None, inner: right, outer: right };
     made.light([2.0; 3], kind);

@@ -13,7 +13,7 @@ use etalon::share::{LIGHT_INDEX, LIGHT_LEAF, LIGHT_TWO_SIDED, LightNode};
 use etalon::study::shape::Shape;
 use etalon::transport::emitters::{EmitterSource, Emitters};
 use etalon::transport::light_hierarchy::LightHierarchy;
-use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::gpu::{Gpu, bits, spread};
 use etalon_testing::made::{Made, Random, at, lambert, orthographic};
 use etalon_testing::probe::evaluate;
 use glam::{DAffine3, DVec3};
@@ -263,7 +263,7 @@ fn have_one_mean(gpu: &Gpu, name: &str, made: &Made, environment: Option<&Enviro
     assert!(bits(&power) != bits(&hierarchy), "{name}: the hierarchy was not used");
     let each = || power.rgba.iter().zip(&hierarchy.rgba).map(|(a, b)| f64::from(b[1]) - f64::from(a[1]));
     let n = power.rgba.len() as f64;
-    let mean = power.rgba.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>() / n;
+    let [mean, ..] = spread(&power, 1);
     let off = each().sum::<f64>() / n;
     let error = (each().map(|d| (d - off).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
     eprintln!("{name}: mean {mean:.5}, difference {:.4} ± {:.4} of it", off / mean, error / mean);
@@ -358,10 +358,7 @@ fn a_room_of_emissive_triangles_is_as_bright_as_it_emits() {
     }
     made.camera(DVec3::new(0.1, -0.2, 0.3), DVec3::new(-0.4, 0.3, -0.9), etalon_testing::made::perspective(90.0));
     let picture = draw(&gpu, &made.0, None, 0, &["samples=256"]);
-    let n = picture.rgba.len() as f64;
-    let mean = picture.rgba.iter().map(|pixel| f64::from(pixel[1])).sum::<f64>() / n;
-    let variance = picture.rgba.iter().map(|pixel| (f64::from(pixel[1]) - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    let error = (variance / n).sqrt();
+    let [mean, error, _] = spread(&picture, 1);
     eprintln!("room: {mean:.5} ± {error:.5}");
     assert!((mean - 1.0).abs() <= 1e-5 + 4.0 * error && error < 2e-3, "{mean} ± {error}");
 }

@@ -11,7 +11,7 @@ use etalon::study::shape::Shape;
 use etalon::transport::bvh::Bvh;
 use etalon::transport::emitters::{EmitterSource, Emitters, Sky};
 use etalon::transport::photon_guiding::PhotonGuiding;
-use etalon_testing::gpu::{Gpu, bits};
+use etalon_testing::gpu::{Gpu, bits, spread};
 use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
 
@@ -24,15 +24,6 @@ fn settings(size: [u32; 2], choices: &[&str]) -> Settings {
 
 fn draw(gpu: &Gpu, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> Picture {
     gpu.shot(scene, environment, settings).1
-}
-
-/// Mean of a channel over a picture, its standard error estimated from the pixels, and the largest value.
-fn spread(picture: &Picture, channel: usize) -> [f64; 3] {
-    let all: Vec<f64> = picture.rgba.iter().map(|pixel| f64::from(pixel[channel])).collect();
-    let n = all.len() as f64;
-    let mean = all.iter().sum::<f64>() / n;
-    let variance = all.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
-    [mean, (variance / n).sqrt(), all.iter().copied().fold(f64::MIN, f64::max)]
 }
 
 /// A cube of one material that fills a parallel view, turned so that three of its faces are seen.

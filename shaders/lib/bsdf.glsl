@@ -108,6 +108,7 @@ struct BsdfSample {
     bool straight; // and is not deflected
     bool diffuse;  // sampled from the diffuse base layer
     bool specular; // sampled from a delta lobe
+    bool coat;     // sampled from the clear coat
 };
 
 // Importance sampling of the BSDF: `x` chooses the lobe, `u` the direction within it.
@@ -122,7 +123,7 @@ BsdfSample bsdf_sample(Bsdf bsdf, float x, vec2 u) {
     bool delta = (coat ? b.coat_delta : b.delta) && !diffuse;
     vec3 h = event_half_vector(b, coat, u);
     vec3 mirrored = reflect_ray(-s.v, h).R;
-    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false, diffuse, delta);
+    BsdfSample r = BsdfSample(delta ? on_side(mirrored, s.n_triangle) : mirrored, vec3(0.0), delta, through, false, diffuse, delta, coat);
     // A delta lobe returns its weight, at the viewer's angle. For rough lobes the caller evaluates the whole BSDF instead.
     vec3 weight = b.f_base * (b.under * b.left);
     float share = b.shares.y;

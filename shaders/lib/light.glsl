@@ -82,13 +82,17 @@ LightPoint light_point(vec3 P, vec3 Q, vec3 N, float I) {
     return r;
 }
 
+// The smooth window of a light's range, which ends at `range` (KHR_lights_punctual). inv_range2 = 1/range², 0 for no range.
+float range_window(float r2, float inv_range2) {
+    float x = r2 * inv_range2;
+    return clamp(1.0 - x * x, 0.0, 1.0);
+}
+
 // @eq R4 N32: E/I = max(min(1 − (r/range)⁴, 1), 0)/r², r at least LIGHT_RADIUS
 // @out falloff
-// On a surface that faces the light, with a smooth window that ends at `range` (KHR_lights_punctual). inv_range2 =
-// 1/range², 0 for no range.
+// On a surface that faces the light.
 float point_falloff(float r2, float inv_range2) {
-    float x = r2 * inv_range2;
-    float window = clamp(1.0 - x * x, 0.0, 1.0);
+    float window = range_window(r2, inv_range2);
     return ARITHMETIC == FAST ? window / r2 : window / max(r2, LIGHT_RADIUS * LIGHT_RADIUS);
 }
 

@@ -1,5 +1,5 @@
 // A vertex of a path of light, from the eye or from a light: the surface that its ray meets, and how it goes on from there.
-// Where to read: pbrt 4, sections 13.2 (path tracing) and 9.1 (BSDF interface). Assumes: bvh space, metres.
+// Where to read: pbrt 4, sections 13.2 (path tracing) and 9.1 (BSDF interface); Veach 1997, section 5.3. Assumes: bvh space, metres.
 #ifndef PATH_VERTEX_GLSL
 #define PATH_VERTEX_GLSL
 #include "lib/bsdf.glsl"
@@ -57,6 +57,13 @@ bool is_unscattered(PathVertex vertex, BsdfSample drawn) {
 vec3 weight_of(PathVertex vertex, BsdfSample drawn, vec3 weight) {
     bool on_right_side = drawn.through == (dot(drawn.direction, vertex.interaction.hit.n) < 0.0);
     return vertex.passed_by ? vec3(1.0) : on_right_side || drawn.straight ? weight : vec3(0.0);
+}
+
+// Where surfaces have shading normals, particles scatter with another weight than paths from the eye: cosines at the
+// shading normal n and the triangle's normal do not cancel. `from` is where the particle came from, `to` where it goes.
+float adjoint_weight(vec3 from, vec3 to, vec3 n, vec3 n_triangle) {
+    float cosines = abs(dot(from, n_triangle) * dot(to, n));
+    return cosines > 1e-8 ? abs(dot(from, n) * dot(to, n_triangle)) / cosines : 1.0;
 }
 
 // Start of the next ray of a path: origin, direction, media. `front_origin` leaves on the viewer's side.

@@ -38,7 +38,7 @@ vec3 irradiance_of(Photon photon, vec3 p, vec3 n) {
 PhotonSample sample_photons(vec3 p, vec3 n, float x, bool wanted) {
     uint chosen = 0;
     vec3 brought = vec3(0.0);
-    float least = 1.0;
+    float chosen_weight = 1.0;
     float sum = 0.0;
     uint end = wanted ? photon_node_at(0).next : 0u;
     uint at = 0;
@@ -61,10 +61,10 @@ PhotonSample sample_photons(vec3 p, vec3 n, float x, bool wanted) {
             x = taken ? (x - keep) / (1.0 - keep) : x / max(keep, 1e-30);
             chosen = taken ? photon.to_light : chosen;
             brought = taken ? now : brought;
-            least = taken ? weight : least;
+            chosen_weight = taken ? weight : chosen_weight;
         }
         at = goes_on ? inside ? at + 1 : node.next : at;
     } while (goes_on);
-    return PhotonSample(unit_from_octahedral(unpackSnorm2x16(chosen)), brought * (sum / least));
+    return PhotonSample(unit_from_octahedral(unpackSnorm2x16(chosen)), brought * (sum / chosen_weight));
 }
 #endif

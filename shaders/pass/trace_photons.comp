@@ -24,13 +24,6 @@ uvec2 photon_words(uint photon, uint surface, uint draw) {
     return random_words(uvec2(trace_terms.sample_index, 0xffffu), surface * DIMENSION_PAIRS + draw, trace_terms.seed, photon);
 }
 
-// Where surfaces have shading normals, particles scatter with another weight than paths from the eye: cosines at the
-// shading normal n and the triangle's normal do not cancel. `from` is where the particle came from, `to` where it goes.
-float adjoint_weight(vec3 from, vec3 to, vec3 n, vec3 n_triangle) {
-    float cosines = abs(dot(from, n_triangle) * dot(to, n));
-    return cosines > 1e-8 ? abs(dot(from, n) * dot(to, n_triangle)) / cosines : 1.0;
-}
-
 void main() {
     uint index = listed_tile(gl_WorkGroupID) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     bool alive = index < count;
@@ -63,9 +56,7 @@ void main() {
         float share = scattering_share(vertex.bsdf.layers) * vertex.interaction.hit.coverage;
         if (lobe && vertex.at_surface && deflected && share > 0.0 && !vertex.interaction.hit.s.unlit) {
             float spot = spot_share(dot(light.axis, ray.direction), light.spot_scale, light.spot_offset);
-            float x = travelled * travelled * light.inv_range2;
-            float window = clamp(1.0 - x * x, 0.0, 1.0);
-            float towards = ray.light < DIRECTIONAL_LIGHTS ? 1.0 : spot * window;
+            float towards = ray.light < DIRECTIONAL_LIGHTS ? 1.0 : spot * range_window(travelled * travelled, light.inv_range2);
             landing.position = vertex.interaction.hit.s.p_bvh;
             landing.normal = vertex.interaction.hit.n;
             landing.to_light = -p.direction;
@@ -78,8 +69,7 @@ void main() {
         vec3 before = p.direction;
         bool straight = is_unscattered(vertex, drawn);
         p.throughput *= weight_of(vertex, drawn, drawn.weight);
-        bool coat = CLEARCOAT && vertex.x < vertex.bsdf.layers.shares.x;
-        vec3 n = coat ? vertex.interaction.hit.s.n_coat : vertex.interaction.hit.s.n;
+        vec3 n = drawn.coat ? vertex.interaction.hit.s.n_coat : vertex.interaction.hit.s.n;
         if (!straight) p.throughput *= adjoint_weight(before, vertex.passed_by ? before : drawn.direction, n, vertex.interaction.hit.n);
         deflected = deflected || !straight;
         leave(p, vertex, drawn, ray_origin(vertex.interaction.hit.s.p_bvh, vertex.interaction.hit.n, vertex.interaction.hit.s.v));

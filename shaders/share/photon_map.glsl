@@ -16,7 +16,7 @@ struct Landing {
     vec3 position;
     vec3 normal;   // of the triangle
     vec3 to_light; // unit vector to where it comes from
-    vec3 power;    // lumens, or watts: the unit of the light; as if the light's medium were that of the landing
+    vec3 power;    // in the unit of the light, times the square of the light's index of refraction over that of the landing
 };
 
 // A node of the bounding volume hierarchy over photons, in depth-first order.
@@ -36,8 +36,8 @@ struct Photon {
 };
 
 const uint PHOTON_COUNT_BITS = 3;
-// Smallest cosine between the normals of two points that lie on one surface. For neighbours of a photon sides differ; for a
-// vertex they do not, since the direction of light tells the side.
+// Smallest cosine between the normals of two points that lie on one surface. Neighbours of a photon lie on its side. A
+// vertex may lie on either side, because the direction of the light tells which side it reaches.
 const float SAME_SURFACE = 0.8;
 // Largest distance of a point from a photon's plane, in radii of its disk.
 const float DISK_THICKNESS = 0.25;

@@ -20,7 +20,7 @@ use super::line;
 use super::octahedral::{octahedral_from_unit, pack_snorm_2x8, pack_snorm_2x16};
 use super::photon_guiding::PhotonRandom;
 use crate::scene::solid::Solids;
-use crate::scene::{Extent, Light, LightKind, Scene};
+use crate::scene::{Extent, Instance, Light, LightKind, Scene};
 use crate::share::{DISK_THICKNESS, Landing, PHOTON_COUNT_BITS, Photon, PhotonNode, PhotonRay, SAME_SURFACE};
 
 /// Neighbours of a photon on its surface inside its disk. With fewer the density is noisier, with more it is blurred.
@@ -39,19 +39,17 @@ const PILOTS_IN_CELL: usize = 4;
 /// Largest number of cells along each side of the square of a light's directions.
 const MOST_CELLS: usize = 128;
 
-/// Element `i` of a sequence that fills the unit square evenly (R2; Roberts 2018): additive recurrence by powers of the
-/// plastic number.
-fn evenly(i: u64) -> DVec2 {
+/// Point `i` of the R2 sequence in the unit square, of low discrepancy (Roberts 2018): additive recurrence by powers of
+/// the plastic number.
+fn r2_point(i: u64) -> DVec2 {
     // Fractions of 2^64, whose sums wrap around by themselves.
     const STEPS: [u64; 2] = [0xc13f_a9a9_02a6_328f, 0x91e1_0da5_c79e_7b1c];
-    DVec2::from(STEPS.map(|step| i.wrapping_mul(step) as f64 / 18_446_744_073_709_551_616.0)).min(DVec2::splat(BELOW_1))
+    DVec2::from(STEPS.map(|step| i.wrapping_mul(step) as f64 / 18_446_744_073_709_551_616.0))
+        .min(DVec2::splat(1.0_f64.next_down()))
 }
 
-/// The largest number below 1.
-const BELOW_1: f64 = 1.0 - f64::EPSILON / 2.0;
-
 /// The directions of a light as a unit square, of equal measure everywhere; of a directional light its cross-section.
-struct Source {
+struct EmissionDomain {
     is_directional: bool,
     /// Shape of a light that emits from an area.
     extent: Option<Extent>,
@@ -66,7 +64,7 @@ struct Source {
     measure: f64,
 }
 
-impl Source {
+impl EmissionDomain {
     fn new(light: &Light, shaped: bool, anchor: DVec3, (middle, radius): (DVec3, f64)) -> Self {
         let (middle, axis, spread, measure) = match light.kind {
             LightKind::Directional { direction } => (middle, direction, radius, 4.0 * radius * radius),
@@ -139,13 +137,19 @@ enum PhotonSurface {
 }
 
 impl PhotonSurface {
-    fn of(scene: &Scene, solids: &Solids, instance: usize) -> Self {
-        let material = &scene.materials[scene.meshes[scene.instances[instance].mesh].material];
-        match (deflects(scene, material), coverage(material)) {
-            (true, _) => Self::Deflects,
-            (false, Some(1.0)) if material.transmission == 0.0 && !solids.solid[instance] => Self::Ends,
-            _ => Self::Passes,
-        }
+    /// By instance. Materials are looked at once each, because their textures are.
+    fn of_instances(scene: &Scene, solids: &Solids) -> Vec<Self> {
+        let deflecting: Vec<bool> = scene.materials.iter().map(|material| deflects(scene, material)).collect();
+        let of = |(instance, placed): (usize, &Instance)| {
+            let index = scene.meshes[placed.mesh].material;
+            let material = &scene.materials[index];
+            match (deflecting[index], coverage(material)) {
+                (true, _) => Self::Deflects,
+                (false, Some(1.0)) if material.transmission == 0.0 && !solids.solid[instance] => Self::Ends,
+                _ => Self::Passes,
+            }
+        };
+        scene.instances.iter().enumerate().map(of).collect()
     }
 }
 
@@ -159,32 +163,33 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(source: &Source, bvh: &Bvh, surfaces: &[PhotonSurface], side: usize, least: f64) -> Self {
+    fn of(domain: &EmissionDomain, bvh: &Bvh, surfaces: &[PhotonSurface], side: usize, least: f64) -> Self {
         // From a light with an area a small surface is seen in other directions at each of its points.
-        let mut seen = vec![source.extent.is_some(); side * side];
+        let mut seen = vec![domain.extent.is_some(); side * side];
         let cell = |at: DVec2| (at.x * side as f64) as usize + side * (at.y * side as f64) as usize;
-        let of = |triangle: &Triangle| surfaces[triangle.instance as usize];
+        let surface_of = |triangle: &Triangle| surfaces[triangle.instance as usize];
         // Large surfaces are met by rays through each cell.
         for (place, seen) in seen.iter_mut().enumerate() {
             let corner = DVec2::new((place % side) as f64, (place / side) as f64);
             *seen |= (0..PILOTS_IN_CELL).any(|i| {
                 let number = (place * PILOTS_IN_CELL + i) as u64;
-                let at = (corner + evenly(number)) / side as f64;
-                let (origin, direction, _) = source.ray(at, evenly(number ^ 1));
-                line::nearest(bvh, origin, direction, least).is_some_and(|met| of(met.triangle) != PhotonSurface::Ends)
+                let at = (corner + r2_point(number)) / side as f64;
+                let (origin, direction, _) = domain.ray(at, r2_point(number ^ 1));
+                line::nearest(bvh, origin, direction, least)
+                    .is_some_and(|met| surface_of(met.triangle) != PhotonSurface::Ends)
             });
         }
         // Small and thin ones may lie between the rays; points along their edges tell the cells.
-        for triangle in bvh.triangles.iter().filter(|triangle| of(triangle) == PhotonSurface::Deflects) {
+        for triangle in bvh.triangles.iter().filter(|triangle| surface_of(triangle) == PhotonSurface::Deflects) {
             let corners = triangle.corners.map(|corner| Vec3::from(corner).as_dvec3());
             for (from, to) in [(0, 1), (1, 2), (2, 0)].map(|(a, b)| (corners[a], corners[b])) {
-                let across = match [from, to].map(|corner| source.place(corner)) {
+                let across = match [from, to].map(|corner| domain.place(corner)) {
                     [Some(one), Some(other)] => (one - other).abs().max_element(),
                     _ => 1.0,
                 };
                 let steps = (2.0 * across * side as f64).ceil().max(1.0);
                 for i in 0..steps as usize {
-                    if let Some(at) = source.place(from.lerp(to, i as f64 / steps)) {
+                    if let Some(at) = domain.place(from.lerp(to, i as f64 / steps)) {
                         seen[cell(at)] = true;
                     }
                 }
@@ -192,8 +197,8 @@ impl Cells {
         }
         // Neighbours as well: what lies across a border is then not cut off. Directions wrap around the axis, and all
         // cells at a pole are neighbours.
-        let wraps = !source.is_directional;
-        let pole = |row: usize| wraps && (row == 0 || (row + 1 == side && source.spread >= 2.0));
+        let wraps = !domain.is_directional;
+        let pole = |row: usize| wraps && (row == 0 || (row + 1 == side && domain.spread >= 2.0));
         let is_seen = |x: usize, y: usize| match pole(y) {
             true => seen[y * side..][..side].contains(&true),
             false => seen[y * side + x],
@@ -240,7 +245,7 @@ pub struct PhotonEmission {
 
 /// The photons of one light.
 struct PhotonSource {
-    source: Source,
+    domain: EmissionDomain,
     cells: Cells,
     /// Points of the rectangle around the wanted cells; those in wanted cells are photons.
     points: u64,
@@ -262,28 +267,27 @@ impl PhotonEmission {
         let bounds = bvh.nodes.first()?.bounds();
         let [low, high] = [bounds.min, bounds.max].map(|corner| Vec3::from(corner).as_dvec3());
         let (middle, radius) = ((low + high) * 0.5, 0.5 * (high - low).length());
-        let surfaces: Vec<PhotonSurface> =
-            (0..scene.instances.len()).map(|i| PhotonSurface::of(scene, solids, i)).collect();
+        let surfaces = PhotonSurface::of_instances(scene, solids);
         let side = (PILOT_RAYS / PILOTS_IN_CELL / scene.lights.len().max(1)).isqrt().clamp(8, MOST_CELLS);
-        let sought: Vec<(Source, Cells, f64)> = scene
+        let sought: Vec<(EmissionDomain, Cells, f64)> = scene
             .lights
             .par_iter()
             .map(|light| {
-                let source = Source::new(light, shaped, bvh.anchor, (middle, radius));
-                let cells = Cells::of(&source, bvh, &surfaces, side, RADII[0] * radius);
-                let power = light.color.iter().map(|&c| f64::from(c)).sum::<f64>() * source.measure * cells.share();
-                (source, cells, power)
+                let domain = EmissionDomain::new(light, shaped, bvh.anchor, (middle, radius));
+                let cells = Cells::of(&domain, bvh, &surfaces, side, RADII[0] * radius);
+                let power = light.color.iter().map(|&c| f64::from(c)).sum::<f64>() * domain.measure * cells.share();
+                (domain, cells, power)
             })
             .collect();
         let all: f64 = sought.iter().map(|(.., power)| power).sum();
-        let emission = |(light, (source, cells, power)): (&Light, (Source, Cells, f64))| {
+        let emission = |(light, (domain, cells, power)): (&Light, (EmissionDomain, Cells, f64))| {
             let of_light = f64::from(count) * power / all;
             let points = if power > 0.0 { (of_light * cells.around() / cells.share()).ceil() as u64 } else { 0 };
             let media = match light.kind {
                 LightKind::Point { position, .. } | LightKind::Spot { position, .. } if points > 0 => media(position),
                 _ => [0; 4],
             };
-            PhotonSource { source, cells, points, media }
+            PhotonSource { domain, cells, points, media }
         };
         let lights = scene.lights.iter().zip(sought).map(emission).collect();
         (all > 0.0).then_some(Self { lights, radius })
@@ -294,22 +298,22 @@ impl PhotonEmission {
     pub fn rays(&self, number: u64) -> Vec<PhotonRay> {
         let mut random = PhotonRandom::new(number);
         let mut rays = Vec::new();
-        for (index, PhotonSource { source, cells, points, media }) in self.lights.iter().enumerate() {
+        for (index, PhotonSource { domain, cells, points, media }) in self.lights.iter().enumerate() {
             // The same points, shifted (Cranley and Patterson 1976), at which they are as even.
             let shift = DVec2::new(random.unit(), random.unit());
             let of_light = random.word();
             let ray = |i: u64| {
-                let at = evenly(i) + shift;
+                let at = r2_point(i) + shift;
                 let at =
                     cells.corner + cells.size * (at - DVec2::select(at.cmpge(DVec2::ONE), DVec2::ONE, DVec2::ZERO));
                 let mut place = PhotonRandom::new(of_light ^ i);
                 let (origin, direction, cosine) =
-                    cells.contains(at).then(|| source.ray(at, DVec2::new(place.unit(), place.unit())))?;
+                    cells.contains(at).then(|| domain.ray(at, DVec2::new(place.unit(), place.unit())))?;
                 Some(PhotonRay {
                     origin: origin.as_vec3().to_array(),
                     light: index as u32,
                     direction: direction.as_vec3().normalize().to_array(),
-                    measure: (source.measure * cells.around() / *points as f64 * cosine.max(0.0)) as f32,
+                    measure: (domain.measure * cells.around() / *points as f64 * cosine.max(0.0)) as f32,
                     media: *media,
                 })
             };
@@ -415,12 +419,12 @@ impl PhotonTree {
     fn distance_of_neighbours(&self, photon: &Landing) -> f64 {
         // The photon itself is among them.
         let mut nearest = [f32::INFINITY; NEIGHBOURS + 1];
-        self.look_in(0, photon, &mut nearest);
+        self.search(0, photon, &mut nearest);
         f64::from(nearest[NEIGHBOURS]).sqrt()
     }
 
     /// Sorts the squared distances of a subtree's photons into `nearest`.
-    fn look_in(&self, at: usize, photon: &Landing, nearest: &mut [f32; NEIGHBOURS + 1]) {
+    fn search(&self, at: usize, photon: &Landing, nearest: &mut [f32; NEIGHBOURS + 1]) {
         let (position, normal) = (Vec3::from(photon.position), Vec3::from(photon.normal));
         let node = &self.nodes[at];
         for other in &self.photons[node.first..node.first + node.count] {
@@ -440,7 +444,7 @@ impl PhotonTree {
             let [near, far] = if children[0].0 <= children[1].0 { children } else { [children[1], children[0]] };
             for (distance2, child) in [near, far] {
                 if distance2 < nearest[NEIGHBOURS] {
-                    self.look_in(child, photon, nearest);
+                    self.search(child, photon, nearest);
                 }
             }
         }
@@ -529,7 +533,7 @@ mod tests {
         let behind = texels.len() / 2 - landings().len();
         let photon = |place: usize| -> Photon { bytemuck::cast([texels[2 * place], texels[2 * place + 1]]) };
         for i in 0..200_u64 {
-            let at = evenly(i);
+            let at = r2_point(i);
             let p = if i % 2 == 0 { at.extend(0.0) } else { DVec3::new(at.x, 0.0, at.y) }.as_vec3();
             let found = found(&texels, p);
             for place in behind..texels.len() / 2 {

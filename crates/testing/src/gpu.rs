@@ -166,3 +166,12 @@ pub fn largest_difference(a: &Picture, b: &Picture, scale: f64) -> f64 {
     let all = a.rgba.iter().flatten().zip(b.rgba.iter().flatten());
     all.fold(0.0, |most, (a, b)| most.max((f64::from(*a) - f64::from(*b)).abs() / scale))
 }
+
+/// Mean of a channel over a picture, its standard error estimated from the pixels, and the largest value.
+pub fn spread(picture: &Picture, channel: usize) -> [f64; 3] {
+    let all: Vec<f64> = picture.rgba.iter().map(|pixel| f64::from(pixel[channel])).collect();
+    let n = all.len() as f64;
+    let mean = all.iter().sum::<f64>() / n;
+    let variance = all.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / (n - 1.0);
+    [mean, (variance / n).sqrt(), all.iter().copied().fold(f64::MIN, f64::max)]
+}
