@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::frame::{Background, Renderer, Settings, TileShare};
 use crate::gpu::Device;
 use crate::image::meter::Meter;
-use crate::plan::rungs::Indirect;
+use crate::plan::rungs::Lights;
 use crate::plan::{EffectId, EffectState, Knobs, Plan};
 use crate::prepare::{Original, Prepared};
 use crate::scene::camera::DEFAULT_FOV_Y;
@@ -107,8 +107,8 @@ impl Sources {
         let shine = has(EffectId::PunctualLights) || has(EffectId::AreaLights);
         let kept = self.lights.iter().zip(&plan.lights).filter(|(_, is_kept)| shine && **is_kept);
         let names: Vec<String> = kept.map(|(name, _)| format!("\"{name}\"")).collect();
-        // Paths find emission wherever they end; other models only show it.
-        let emissive_surfaces = self.emits && has(EffectId::PathTracing);
+        // Paths find emission wherever they end; other models sample it, or only show it.
+        let emissive_surfaces = self.emits && (has(EffectId::PathTracing) || has(EffectId::EmissiveLights));
         let environment = self.environment.filter(|_| has(EffectId::Environment));
         let factor = if environment.is_some() { self.factor } else { 0.0 };
         let mut by = Vec::new();
@@ -130,6 +130,11 @@ impl Sources {
         let sentence = format!("lit by {by}{}", self.why);
         LitBy { environment, factor, lights: names.len(), emissive_surfaces, sentence }
     }
+}
+
+/// Whether these knobs follow the light of emissive surfaces to others.
+fn follows_emission(knobs: &Knobs) -> bool {
+    knobs.lights != Lights::Points
 }
 
 /// Whether `scene` is the name of a file and not of a study scene.
@@ -233,15 +238,15 @@ impl Opened {
     /// Factor of the environment, `None` where it does not light the scene, and the reason at the end of a sentence.
     ///
     /// Asked for, by itself or as the background, it lights as it is; a scene built by code says itself. For a file:
-    /// - where paths follow the light of emissive surfaces and there is enough of it, the author lit the scene with
-    ///   them, and a studio would drown them;
+    /// - where the light of emissive surfaces is followed and there is enough of it, the author lit the scene with them,
+    ///   and a studio would drown them;
     /// - beside lights it is a fill light ([`FILL`]), as in the glTF Sample Viewer: without it, what the lights do not
     ///   reach is black;
     /// - without lights it is all the light there is. That includes emissive surfaces in models that do not follow
     ///   their light: they would hang in a black picture.
     fn share(&self, settings: &Settings) -> (Option<f32>, &'static str) {
         let scene = self.scene();
-        let is_followed = self.follows.unwrap_or(settings.knobs.indirect == Indirect::Path);
+        let is_followed = self.follows.unwrap_or(follows_emission(&settings.knobs));
         match (self.is_asked_for || settings.background == Background::Environment, scene.studio) {
             (true, _) => (Some(1.0), ""),
             (_, Some(studio)) => (Some(studio), ""),
@@ -249,7 +254,7 @@ impl Opened {
                 (None, ", without the built-in studio, which --background env adds")
             }
             _ if scene.lights.is_empty() && !is_followed && self.is_lit_by_emission() => {
-                (Some(1.0), ", because only --model global follows the light of its emissive surfaces")
+                (Some(1.0), ", because lights=points does not follow the light of its emissive surfaces")
             }
             _ if scene.lights.is_empty() => (Some(1.0), ""),
             _ if self.is_file => (Some(FILL), " as fill light, which --env none removes"),
@@ -259,7 +264,7 @@ impl Opened {
 
     /// Keeps the light that these knobs choose for all other knobs, too: for pictures that are compared.
     pub fn keep_light(&mut self, knobs: &Knobs) {
-        self.follows = Some(knobs.indirect == Indirect::Path);
+        self.follows = Some(follows_emission(knobs));
     }
 
     /// Whether the environment depends on the knobs of a picture.

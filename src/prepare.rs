@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::{Result, anyhow, bail};
 use glam::DVec3;
 
-use crate::plan::{Facts, ForcedEffects, Knobs, Plan, Rays, Surroundings, needs_lights};
+use crate::plan::{Facts, ForcedEffects, Knobs, LightSamples, Plan, Rays, Surroundings, needs_lights};
 use crate::scene::canonical::{CanonicalForm, canonicalise};
 use crate::scene::environment::Environment;
 use crate::scene::prune::prune_unused;
@@ -196,11 +196,16 @@ impl Prepared {
         let mut kept = plan.lights.iter();
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
         // Directional lights come first: loops over lights and the light sampling table rely on it.
-        scene.lights.sort_by_key(|light| !matches!(light.kind, LightKind::Directional { .. }));
+        // Those that other models than path tracing sample come last, where their loops do not reach.
+        let sampled = |light: &Light| plan.paths.is_none() && plan.light_samples.shaped && light.extent.is_some();
+        scene.lights.sort_by_key(|light| (!matches!(light.kind, LightKind::Directional { .. }), sampled(light)));
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
-        let emitters =
-            plan.paths.map_or_else(Emitters::default, |paths| Emitters::of(&scene, conditions.sky, paths.emitting));
+        let LightSamples { emitting, shaped, .. } = plan.light_samples;
+        let emitters = match plan.paths {
+            Some(_) => Emitters::of(&scene, conditions.sky, emitting),
+            None => Emitters::with_extent(&scene, shaped, emitting),
+        };
         let hierarchy = match plan.rays {
             Some(rays) => Some(Hierarchy::of(&scene, original.tree_of(|| &scene)?, &solids, rays)),
             None => None,

@@ -1,7 +1,7 @@
-// Light sampling: punctual lights, emissive triangles and the environment, with their densities (lecture R2–R4).
-// One emitter is chosen by a CDF over powers, then a point or direction on it. Each CDF is in 32-bit fixed point: a random
-// 32-bit word is looked up by binary search, and its position inside the bin becomes the next random number. The
-// environment has a marginal CDF over rows and one conditional CDF over columns for each row.
+// Light sampling: emissive triangles and the lights of the table, with their densities (lecture R2–R4).
+// One emitter is chosen by a CDF over powers, then a point on it. The CDF is in 32-bit fixed point: a random 32-bit word is
+// looked up by binary search, and its position inside the bin becomes the next random number. The environment, which is an
+// emitter of path tracing alone, is in lib/light_sampling.glsl.
 // With the light hierarchy the emitters that have a place share the last bin. The descent from its root divides the bin
 // between two children in proportion to their importance at the shaded point, again and again.
 // Where to read: pbrt 4, section 12.6 (light sampling) and appendix A (piecewise constant distributions); Conty Estevez and
@@ -10,7 +10,6 @@
 #ifndef EMITTERS_GLSL
 #define EMITTERS_GLSL
 #include "lib/encode.glsl"
-#include "lib/environment.glsl"
 #include "lib/hit.glsl"
 #include "lib/punctual.glsl"
 #include "lib/random.glsl"
@@ -21,21 +20,20 @@ layout(constant) const uint EMITTER_SEARCH_STEPS = 0;           // binary-search
 layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some emitter is a light of the table
 layout(constant) const bool AREA_EMITTERS = false;     // some light of the table is an analytic area light
 layout(constant) const bool EMISSIVE_TRIANGLES = false;  // some emitter is an emissive triangle
-layout(constant) const bool SAMPLED_ENVIRONMENT = false;        // the environment is an emitter
 layout(constant) const bool LIGHT_HIERARCHY = false;     // emitters with a place are chosen by their importance
+layout(constant) const uint FIRST_EMITTER = 0;           // texel of the first emitter, behind the triangles
 layout(constant) const uint LIGHT_NODES = 0;             // texel of the hierarchy's root, behind the emitters
-layout(constant) const uint CDF_COLUMNS = 0;             // columns of the environment's CDF
-layout(constant) const uint CDF_ROWS = 0;
-layout(constant) const uint CDF_SEARCH_STEPS = 0;               // binary-search steps in a row, or over the rows
+layout(constant) const uint LIGHT_SAMPLES = 0;           // light samples (shadow rays) of each surface
 
-layout(paths, rgba32ui) readonly uniform uimageBuffer emitters;
-// @texels Emitter emitter_at(emitters)
+// The tables follow the triangles in their buffer: every pass that sends rays has room for it among its storage images.
+uvec4 emitter_texel(uint index, int texel) {
+    return imageLoad(bvh_triangles, int(FIRST_EMITTER + index) + texel);
+}
+// @texels Emitter emitter_at(emitter_texel)
 uvec4 light_node_texel(uint index, int texel) {
-    return imageLoad(emitters, int(LIGHT_NODES + 2u * index) + texel);
+    return imageLoad(bvh_triangles, int(LIGHT_NODES + 2u * index) + texel);
 }
 // @texels LightNode light_node_at(light_node_texel)
-// Lower ends of the bins: the marginal CDF over rows; then, row by row, the conditional CDF over columns.
-layout(paths, r32ui) readonly uniform uimageBuffer environment_cdf;
 
 // A light sample: light that may arrive at a point from one point on a light.
 struct LightSample {
@@ -56,62 +54,6 @@ float remapped_in_bin(uint word, uint first, uint next) {
 // Probability of a bin: its size over 2^32.
 float bin_probability(uint first, uint next) {
     return next == first ? 1.0 : float(next - first) * (1.0 / 4294967296.0);
-}
-
-// Binary search for the bin that holds a word, in a CDF of `count` entries from `base` on.
-uint search_environment_cdf(uint base, uint count, uint word) {
-    uint found = 0;
-    for (uint step = CDF_SEARCH_STEPS; step > 0; step--) {
-        uint next = found + (1u << (step - 1));
-        uint first = imageLoad(environment_cdf, int(base + min(next, count - 1))).x;
-        found = next < count && first <= word ? next : found;
-    }
-    return found;
-}
-
-uint environment_cdf_at(uint base, uint count, uint i) {
-    return i < count ? imageLoad(environment_cdf, int(base + i)).x : 0u;
-}
-
-// Density per solid angle of a texel of the environment's CDF; sin_theta is the sine of its polar angle.
-float environment_texel_pdf(float p_row, float p_column, float sin_theta) {
-    return p_row * p_column * float(CDF_ROWS * CDF_COLUMNS) / (2.0 * PI * PI * max(sin_theta, 1e-6));
-}
-
-// Density, among all light samples, of a direction in world axes.
-float environment_pdf(vec3 direction) {
-    if (!SAMPLED_ENVIRONMENT) return 0.0;
-    vec3 d = into_environment(direction);
-    vec2 at = equirectangular_from_direction(d);
-    uint row = min(uint(max(at.y, 0.0) * float(CDF_ROWS)), CDF_ROWS - 1);
-    uint column = min(uint(max(at.x, 0.0) * float(CDF_COLUMNS)), CDF_COLUMNS - 1);
-    uint columns = CDF_ROWS + row * CDF_COLUMNS;
-    float p_row = bin_probability(environment_cdf_at(0, CDF_ROWS, row), environment_cdf_at(0, CDF_ROWS, row + 1));
-    float p_column = bin_probability(environment_cdf_at(columns, CDF_COLUMNS, column), environment_cdf_at(columns, CDF_COLUMNS, column + 1));
-    // The environment is the first emitter.
-    float picked = emitter_at(0).probability;
-    return picked * environment_texel_pdf(p_row, p_column, sqrt(d.x * d.x + d.z * d.z));
-}
-
-struct EnvironmentSample {
-    vec3 direction;
-    float pdf;
-};
-
-EnvironmentSample sample_environment(uint word_x, uint word_y) {
-    uint row = search_environment_cdf(0, CDF_ROWS, word_y);
-    uint row_first = environment_cdf_at(0, CDF_ROWS, row);
-    uint row_next = environment_cdf_at(0, CDF_ROWS, row + 1);
-    uint columns = CDF_ROWS + row * CDF_COLUMNS;
-    uint column = search_environment_cdf(columns, CDF_COLUMNS, word_x);
-    uint first = environment_cdf_at(columns, CDF_COLUMNS, column);
-    uint next = environment_cdf_at(columns, CDF_COLUMNS, column + 1);
-    float u = (float(column) + remapped_in_bin(word_x, first, next)) / float(CDF_COLUMNS);
-    float v = (float(row) + remapped_in_bin(word_y, row_first, row_next)) / float(CDF_ROWS);
-    vec3 d = direction_from_equirectangular(vec2(u, v));
-    float across = sqrt(d.x * d.x + d.z * d.z);
-    float pdf = environment_texel_pdf(bin_probability(row_first, row_next), bin_probability(first, next), across);
-    return EnvironmentSample(turned(d, environment.cos_rotation, -environment.sin_rotation), pdf);
 }
 
 // Twice the area of a triangle, times the unit normal of its front.
@@ -190,71 +132,75 @@ float light_pdf_area(uint triangle, vec3 from, bool wanted) {
     return pdf;
 }
 
-// Draws one light sample for a point at `origin` in bvh space. For the environment `arriving` is 1 over the density: the
-// caller multiplies by the environment's radiance.
-LightSample sample_light(vec3 origin, uvec2 words) {
-    LightSample r = LightSample(vec3(0.0, 1.0, 0.0), -1.0, vec3(0.0), 0.0);
-    // 1. Choose an emitter: binary search in the CDF over powers.
+struct EmitterChoice {
+    Emitter emitter;
+    float probability;
+    float x; // uniform random number for the point on it
+};
+
+// Chooses an emitter for a point in bvh space: binary search in the CDF over powers, then the light hierarchy.
+EmitterChoice choose_emitter(vec3 p, uint word) {
     uint found = 0;
     for (uint step = EMITTER_SEARCH_STEPS; step > 0; step--) {
         uint next = found + (1u << (step - 1));
         uint first = emitter_at(min(next, EMITTERS - 1)).first;
-        found = next < EMITTERS && first <= words.x ? next : found;
+        found = next < EMITTERS && first <= word ? next : found;
     }
-    Emitter emitter = emitter_at(found);
+    EmitterChoice r;
+    r.emitter = emitter_at(found);
     uint next_first = found + 1 < EMITTERS ? emitter_at(found + 1).first : 0u;
-    float probability = emitter.probability;
-    float x = remapped_in_bin(words.x, emitter.first, next_first);
+    r.probability = r.emitter.probability;
+    r.x = remapped_in_bin(word, r.emitter.first, next_first);
     if (LIGHT_HIERARCHY) {
         bool by_place = found == EMITTERS - 1;
-        HierarchyChoice choice = descend_light_hierarchy(origin, words.x, 0, by_place);
+        HierarchyChoice choice = descend_light_hierarchy(p, word, 0, by_place);
         if (by_place) {
-            emitter = emitter_at(choice.emitter);
-            emitter.kind = choice.size > 0 ? emitter.kind : EMITTER_NONE;
-            probability = bin_probability(choice.first, choice.first + choice.size);
-            x = remapped_in_bin(words.x, choice.first, choice.first + choice.size);
+            r.emitter = emitter_at(choice.emitter);
+            r.emitter.kind = choice.size > 0 ? r.emitter.kind : EMITTER_NONE;
+            r.probability = bin_probability(choice.first, choice.first + choice.size);
+            r.x = remapped_in_bin(word, choice.first, choice.first + choice.size);
         }
     }
-    uint kind = emitter.kind & EMITTER_KIND;
-    // 2a. A punctual light, or a point on an analytic area light.
+    return r;
+}
+
+// A light sample on a chosen emitter, for a point at `origin` in bvh space; `word` is the second random number. None, with
+// `arriving` 0, where the emitter is the environment.
+LightSample sample_emitter(vec3 origin, EmitterChoice choice, uint word) {
+    LightSample r = LightSample(vec3(0.0, 1.0, 0.0), -1.0, vec3(0.0), 0.0);
+    uint kind = choice.emitter.kind & EMITTER_KIND;
+    // 1. A punctual light, or a point on an analytic area light.
     if (PUNCTUAL_EMITTERS) {
         if (kind == EMITTER_PUNCTUAL) {
             vec3 p_rel = origin - trace_terms.bvh_from_rel;
-            PunctualLight light = AREA_EMITTERS ? shaped_light_at(emitter.place, p_rel, vec2(x, unit_float(words.y)))
-                : punctual_light_at(emitter.place, p_rel);
+            PunctualLight light = AREA_EMITTERS ? shaped_light_at(choice.emitter.place, p_rel, vec2(choice.x, unit_float(word)))
+                : punctual_light_at(choice.emitter.place, p_rel);
             r = LightSample(light.directional ? light.l : light.to_light, light.directional ? LARGEST : 1.0,
-                            light.arriving / probability, 0.0);
+                            light.arriving / choice.probability, 0.0);
         }
     }
-    // 2b. A direction to the environment.
-    if (SAMPLED_ENVIRONMENT) {
-        if (kind == EMITTER_ENVIRONMENT) {
-            EnvironmentSample sky = sample_environment(uint(x * 4294967040.0), words.y);
-            float pdf = probability * sky.pdf;
-            r = LightSample(sky.direction, LARGEST, vec3(1.0 / pdf), pdf);
-        }
-    }
-    // 2c. A point on an emissive triangle.
+    // 2. A point on an emissive triangle.
     if (EMISSIVE_TRIANGLES) {
         if (kind == EMITTER_TRIANGLE) {
             // Low-distortion map from the unit square to a triangle (Heitz 2019): it folds along the diagonal.
-            float y = unit_float(words.y);
+            float y = unit_float(word);
+            float x = choice.x;
             vec2 w = y > x ? vec2(0.5 * x, y - 0.5 * x) : vec2(x - 0.5 * y, 0.5 * y);
             vec3 a, ab, ac;
-            vec3 doubled = doubled_area_of(emitter.place, a, ab, ac);
+            vec3 doubled = doubled_area_of(choice.emitter.place, a, ab, ac);
             float size = vector_length(doubled);
             vec3 n = doubled / size;
             vec3 p = a + w.x * ab + w.y * ac;
             vec3 to_light = p - origin;
             float side = dot(n, to_light) < 0.0 ? 1.0 : -1.0;
-            bool shows = side > 0.0 || (emitter.kind & EMITTER_TWO_SIDED) != 0;
+            bool shows = side > 0.0 || (choice.emitter.kind & EMITTER_TWO_SIDED) != 0;
             // The end of the shadow ray lies off the triangle by `offset`, so that the triangle does not occlude itself.
             to_light += n * (side * trace_terms.offset);
             float r2 = dot(to_light, to_light);
             float cos_light = -side * dot(n, to_light) * inversesqrt(r2);
-            float pdf = density_per_solid_angle(probability * 2.0 / size, r2, cos_light);
+            float pdf = density_per_solid_angle(choice.probability * 2.0 / size, r2, cos_light);
             bool lights = shows && r2 > 0.0 && cos_light > 0.0 && pdf <= LARGEST;
-            vec3 radiance = emission_at(emitter.place, w.x, w.y);
+            vec3 radiance = emission_at(choice.emitter.place, w.x, w.y);
             r = LightSample(to_light, 1.0, lights ? radiance / pdf : vec3(0.0), lights ? pdf : 0.0);
         }
     }

@@ -1,8 +1,10 @@
-// Direct lighting of a surface: emission, punctual lights with shadows, and the environment (ambient and split sum).
-// Tiled light culling limits the lights to those of the pixel's tile (pass/tiles.comp). Where to read: RTR 4, sections 9.8,
-// 10.5 and 20.3. Assumes: world axes, positions relative to the eye, metres.
+// Direct lighting of a surface: emission, lights with shadows, and the environment (ambient and split sum).
+// Punctual lights are taken one by one; tiled light culling limits them to those of the pixel's tile (pass/tiles.comp).
+// Emissive surfaces and lights with an area are sampled (next event estimation). Where to read: RTR 4, sections 9.8, 10.5
+// and 20.3; pbrt 4, section 13.2. Assumes: world axes, positions relative to the eye, metres.
 #ifndef LIGHTING_GLSL
 #define LIGHTING_GLSL
+#include "lib/emitters.glsl"
 #include "lib/encode.glsl"
 #include "lib/environment_light.glsl"
 #include "lib/light_tile.glsl"
@@ -15,29 +17,68 @@ layout(constant) const uint TILE_WORDS = 0;         // 32-bit words of a tile's 
 
 layout(pass, scalar) readonly buffer TileLights { uint tile_lights[]; };
 
+// Some light has shadow rays: shadow maps are drawn from points, so light samples have rays beside them.
+bool sends_shadow_rays() {
+    return SHADOWS == SHADOW_RAY || (LIGHT_SAMPLES > 0 && SHADOWS == SHADOW_MAP);
+}
+
 // Ratio of reflected radiance to irradiance below which a shadowed light casts no shadow ray and adds nothing. It cuts the
 // tails of lobes on polished surfaces: a grey surface reflects ten thousand times as much.
 const float FAINTEST_LOBE = 1.0 / 131072.0;
 
-// Radiance that light `index` of the table adds, with its shadow.
-vec3 light_on(Layers b, uint index) {
+// Event of the random numbers of light samples, before the number of the surface. Those of reflection and refraction, and
+// of ambient occlusion, are smaller.
+const uint LIGHT_EVENT = 0x800u;
+
+// A light sample by next event estimation: one of LIGHT_SAMPLES for each sample of a pixel. `to_light` begins where the
+// shadow ray does.
+LightSample light_sample(Surface s, uvec2 pixel, uint surface, uint i) {
+    vec3 origin = ray_origin(s.p_bvh, s.n_triangle, s.v);
+    uvec2 words = random_words(pixel, LIGHT_EVENT + surface, trace_terms.seed, trace_terms.sample_index * LIGHT_SAMPLES + i);
+    return sample_emitter(origin, choose_emitter(origin, words.x), words.y);
+}
+
+// The layers without the lobes of which rays find the light: such a ray meets emissive surfaces itself.
+Layers without_traced_lobes(Layers b) {
+    if (b.s.base_traced) {
+        b.s.f0 = vec3(0.0);
+        b.s.compensation = vec3(0.0);
+    }
+    if (CLEARCOAT && b.s.coat_traced) {
+        b.coat_delta = true;
+        b.under = under_coat(b.s);
+    }
+    return b;
+}
+
+// Radiance that light `index` of the table adds, with its shadow; where `is_sample`, that of a light sample.
+vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     Surface s = b.s;
-    PunctualLight light = punctual_light_at(index, s.p_rel);
+    PunctualLight light = punctual_light_at(is_sample ? 0u : index, s.p_rel);
+    if (LIGHT_SAMPLES > 0) {
+        if (is_sample) {
+            LightSample drawn = light_sample(s, pixel, surface, index);
+            light = PunctualLight(drawn.to_light, normalize(drawn.to_light), drawn.arriving / float(LIGHT_SAMPLES), false);
+            if (EMISSIVE_TRIANGLES && drawn.pdf > 0.0) b = without_traced_lobes(b);
+        }
+    }
     vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
     if (DIFFUSE_TRANSMISSION) {
         // Light from behind: seen from there, the surface is turned over.
         vec3 through = evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
         if (largest(through) > 0.0) {
+            vec3 front = ray_origin(s.p_bvh, s.n_triangle, s.v);
             result = through;
             s.n = -s.n;
             s.n_triangle = -s.n_triangle;
             s.v = reflect(s.v, s.n);
+            if (LIGHT_SAMPLES > 0 && is_sample) light.to_light += front - ray_origin(s.p_bvh, s.n_triangle, s.v);
         }
     }
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, light.l);
         bool wanted = largest(result) > FAINTEST_LOBE * largest(light.arriving);
-        if (SHADOWS == SHADOW_MAP) {
+        if (SHADOWS == SHADOW_MAP && !(LIGHT_SAMPLES > 0 && is_sample)) {
             float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(s.p_rel));
             return wanted ? result * share : vec3(0.0);
         }
@@ -47,7 +88,8 @@ vec3 light_on(Layers b, uint index) {
     return result;
 }
 
-// The lights of one dispatch: indices of the table, and words of the tiles' bit masks.
+// The lights of one dispatch: numbers of directional lights, then of light samples, then of point and spot lights; and words
+// of the tiles' bit masks.
 struct LightRange {
     uint first;
     uint end;
@@ -58,9 +100,10 @@ struct LightRange {
 // Loop iterations after which no further light is started.
 layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 
-vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) {
+// `surface` is the number of the surface along the pixel's rays, for the random numbers.
+vec3 light_of_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
-    if (DIRECTIONAL_LIGHTS + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
+    if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
     // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
     // the body of a loop at least once, and the body for a light is long.
     int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
@@ -78,18 +121,20 @@ vec3 punctual_light(Layers b, ivec2 pixel, uint tiles_across, LightRange range) 
         bool out_of_steps = loop_iterations > LIGHT_BUDGET && !(listed && bits == 0);
         lights_cut_off += out_of_steps ? 1u : 0u;
         if (out_of_steps || (listed && bits == 0)) break;
-        uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : next;
+        bool is_sample = !listed && next >= DIRECTIONAL_LIGHTS && next < DIRECTIONAL_LIGHTS + LIGHT_SAMPLES;
+        uint numbered = is_sample ? next - DIRECTIONAL_LIGHTS : next < DIRECTIONAL_LIGHTS ? next : next - LIGHT_SAMPLES;
+        uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : numbered;
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;
-        sum += light_on(b, index);
+        sum += light_on(b, index, is_sample, uvec2(pixel), surface);
     }
     return sum;
 }
 
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
 // environment.
-vec3 radiance_to_eye(Surface s, ivec2 pixel, uint tiles_across, LightRange range, bool all_around) {
-    vec3 result = punctual_light(layers_of(s), pixel, tiles_across, range);
+vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, LightRange range, bool all_around) {
+    vec3 result = light_of_lights(layers_of(s), pixel, surface, tiles_across, range);
     vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
     if (AMBIENT || REFLECTION) around += environment_light(s);
     result += all_around ? around : vec3(0.0);

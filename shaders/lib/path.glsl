@@ -8,13 +8,12 @@
 // Assumes: bvh space, metres; densities per solid angle; radiance divided by the square of the index of refraction.
 #ifndef PATH_GLSL
 #define PATH_GLSL
-#include "lib/emitters.glsl"
+#include "lib/light_sampling.glsl"
 #include "lib/path_vertex.glsl"
 #include "lib/photon_map.glsl"
 #include "lib/work_count.glsl"
 
 layout(constant) const bool EMISSIVE_LIGHTS = false; // emissive surfaces light the scene; otherwise they are only seen
-layout(constant) const uint LIGHT_SAMPLES = 1; // light samples (shadow rays) per vertex
 
 // Russian roulette from this vertex on: a path survives with a probability that falls with the path throughput, at most
 // MOST_LIKELY.

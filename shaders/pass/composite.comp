@@ -50,9 +50,9 @@ void main() {
     vec3 sum = vec3(0.0);
     vec3 through = vec3(1.0);
     uvec3 last = uvec3(0xffffffffu);
-    LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, TILE_WORDS);
+    LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS, 0, TILE_WORDS);
     vec2 shift = vec2(0.0); // offset in pixels of the refracted background
-    bool nearest = true;
+    uint surface = 0;
     float entry = 0.0;      // depth of the nearest transparent solid
     uint per_fragment = 0; // loop iterations of the last fragment: its neighbours in the list see the same lights
     while (true) {
@@ -114,10 +114,10 @@ void main() {
         // 5. Lighting of the fragment.
         float alpha = blue_alpha.y;
         compensate(s);
-        vec3 shown = radiance_to_eye(s, pixel, tiles_across, all, true);
+        vec3 shown = radiance_to_eye(s, pixel, surface, tiles_across, all, true);
         // Screen-space reflection for the nearest fragment alone: a ray may march as many steps as the picture is wide.
-        if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, nearest));
-        nearest = false;
+        if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, surface == 0));
+        surface++;
         // 6. Composite front to back.
         sum += through * alpha * shown;
         through *= 1.0 - alpha + alpha * passes;
@@ -133,5 +133,5 @@ void main() {
     }
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4((BEHIND_ALONE ? vec3(0.0) : sum) + through * behind.rgb, coverage));
-    if (SHADOWS == SHADOW_RAY && !BEHIND_ALONE) count_rays(0, 0, 0.0, 0.0);
+    if (sends_shadow_rays() && !BEHIND_ALONE) count_rays(0, 0, 0.0, 0.0);
 }

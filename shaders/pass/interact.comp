@@ -272,11 +272,12 @@ void main() {
                 keep_diffuse(s, 1.0 - hit.transmits);
                 // Light traced by a ray is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
-                LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LOCAL_LIGHTS, 0, 0);
+                LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS, 0, 0);
                 vec3 weight = wanted(ray.events, ray.throughput * hit.coverage);
                 bool lit = !boundary.suppressed_by_priority;
+                uint surface = reflection_rays + refraction_rays;
                 split(hit, boundary, ray, cone, uvec2(pixel));
-                if (lit) sum += weight * radiance_to_eye(s, pixel, 0, all, true);
+                if (lit) sum += weight * radiance_to_eye(s, pixel, surface, 0, all, true);
             } else {
                 bool direct = (ray.events & 0x200u) != 0;
                 bool clear = direct && !SKY;

@@ -26,9 +26,9 @@ void main() {
     if (!lit.drawn) return;
     Surface s = lit.s;
     uint tiles_across = (camera.size.x + TILE - 1) / TILE;
-    vec3 result = radiance_to_eye(s, pixel, tiles_across, range, first_dispatch != 0) * left_at_eye(s);
+    vec3 result = radiance_to_eye(s, pixel, 0, tiles_across, range, first_dispatch != 0) * left_at_eye(s);
     if (lit.suppressed) result = vec3(0.0);
     if (first_dispatch == 0) result += imageLoad(radiance, pixel).rgb;
     imageStore(radiance, pixel, vec4(result, 1.0));
-    if (SHADOWS == SHADOW_RAY) count_rays(0, 0, 0.0, 0.0);
+    if (sends_shadow_rays()) count_rays(0, 0, 0.0, 0.0);
 }

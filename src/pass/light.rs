@@ -24,7 +24,7 @@ pub fn light<'a>(
     let mut library = lighting.library;
     // Without shadow rays, and with the eye outside of closed meshes, the pass sends no ray: one pipeline for all
     // plans.
-    if !(lighting.shadow_rays() || library.primary.in_medium) {
+    if !(lighting.shadow_rays() || library.primary.in_medium || lighting.plan.light_samples.count > 0) {
         library.trace = lib::trace::Constants::default();
         library.hit = lib::hit::Constants::default();
         library.sigma_grid = lib::sigma_grid::Constants::default();

@@ -25,8 +25,8 @@ pub struct Lighting<'a> {
     pub share: TileShare,
 }
 
-/// The ranges of lights for each dispatch: directional lights, then local ones, at most [`LIGHTS_AT_ONCE`] each. The
-/// last directional range takes the first local one if both are small. Local lights are divided at the same indices
+/// The ranges of lights for each dispatch: directional lights and light samples, then local lights, at most
+/// [`LIGHTS_AT_ONCE`] each. The last range of the first kind takes the first one of the second if both are small. Local lights are divided at the same indices
 /// with and without tiled light culling, so the sums are bit-identical.
 fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
     let of =
@@ -57,12 +57,13 @@ impl Lighting<'_> {
     /// The range of each dispatch: all lights at once, or a few at a time when each sends a shadow ray.
     #[must_use]
     pub fn ranges(&self) -> Vec<LightRange> {
-        let Plan { directional_lights, local_lights, tiles, .. } = *self.plan;
+        let Plan { directional_lights, local_lights, tiles, light_samples, .. } = *self.plan;
+        let first = directional_lights + light_samples.count;
         match self.shadow_rays() {
-            true => parts(directional_lights, local_lights, tiles),
+            true => parts(first, local_lights, tiles),
             false => vec![LightRange {
                 first: 0,
-                end: directional_lights + self.library.lighting.local_lights,
+                end: first + self.library.lighting.local_lights,
                 first_word: 0,
                 end_word: self.tiles.words(),
             }],

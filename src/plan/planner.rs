@@ -14,10 +14,10 @@ use super::surfaces::{
     self, Surfaces, Transmission, by_wavelength, has_layers, has_lobe_texels, is_transparent, mirrors, refracts,
     scatters,
 };
-use super::work::{Attenuation, March, Paths, Plan, Rays, Screen, Stored};
+use super::work::{Attenuation, LightSamples, March, Paths, Plan, Rays, Screen, Stored};
 use crate::scene::lobe::{LOBES, SHEEN};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
-use crate::transport::emitters::bounded;
+use crate::transport::emitters::{bounded, is_emitter};
 use crate::transport::layers::{SMOOTHEST, deflects, is_smooth};
 
 /// Perceptual roughness up to which surfaces have screen-space reflections.
@@ -53,12 +53,18 @@ impl Plan {
         let layers = planner.layers();
         let transmission = planner.transmission();
         let images = planner.mirror_images(&transmission);
-        let paths = planner.paths();
-        let lights = planner.lights(paths);
-        let paths = planner.caustics(paths, &lights);
-        let rays = planner.rays(&transmission, &images, &lights);
+        let followed = planner.path_tracing();
+        let samples = planner.light_samples(followed);
+        let guided = planner.path_guiding(followed, samples);
+        let lights = planner.lights(samples);
+        let photons = planner.caustics(followed, &lights);
+        let paths = planner.paths.then_some(Paths { guided, photons });
+        let rays = planner.rays(&transmission, &images, &lights, samples);
         let (bands, disperses) = planner.wavelengths(&transmission);
-        let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && paths.is_none();
+        let shadow_maps = lights.shadows
+            && knobs.shadows == Shadows::Map
+            && paths.is_none()
+            && (lights.directional + lights.local > 0 || surroundings.forced == ForcedEffects::All);
         let stored = if paths.is_some() { Stored::default() } else { Stored::of(knobs) };
         let Planner { surfaces, decisions, .. } = planner;
         Self {
@@ -90,6 +96,7 @@ impl Plan {
             shadow_maps,
             lights: lights.kept,
             rays,
+            light_samples: samples,
             paths,
             screen: images.screen,
             roughest_mirror: images.roughest,
@@ -276,13 +283,13 @@ impl Planner<'_> {
         }
     }
 
-    fn lights(&mut self, followed: Option<Paths>) -> Lights {
+    fn lights(&mut self, samples: LightSamples) -> Lights {
         let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
         let lit = surfaces.any(|m| !m.unlit);
         let bounds = scene.bounds();
         let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
         // The emissive surfaces behind a proxy light are lights themselves.
-        let replaced = |light: &Light| light.proxy && followed.is_some_and(|paths| paths.emitting);
+        let replaced = |light: &Light| light.proxy && samples.emitting;
         let useful = |light: &Light| light.shines() && reaches(light) && !replaced(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
         // Black placeholder lights keep loops non-empty when lights are forced but absent. Beside real lights they
@@ -294,8 +301,11 @@ impl Planner<'_> {
         let keeps =
             |light: &Light| free.iter().any(|kept| std::ptr::eq(*kept, light)) || (useful(light) && (lit || is_forced));
         let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
+        // Paths sample every light; other models sample those with an extent and take the others one by one.
+        let sampled = |light: &Light| !*paths && samples.shaped && light.extent.is_some();
         let count = |test: &dyn Fn(&LightKind) -> bool| {
-            scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && test(&light.kind)).count() as u32
+            let counts = |light: &Light| !sampled(light) && test(&light.kind);
+            scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && counts(light)).count() as u32
         };
         let directional = count(&|kind| matches!(kind, LightKind::Directional { .. }));
         let local = count(&|kind| !matches!(kind, LightKind::Directional { .. }));
@@ -310,6 +320,7 @@ impl Planner<'_> {
             (_, false, _) if dark == scene.lights.len() => Cause::against("all lights have zero intensity"),
             (_, false, _) => Cause::against("no light reaches the scene"),
             (.., false) => Cause::against("all visible materials are unlit"),
+            _ if directional + local == 0 => Cause::against("all lights have an area, and are sampled"),
             _ => Cause::of(format!("{directional} directional lights, {local} point and spot lights")),
         };
         let counts = |cause: Cause| match scene.lights.is_empty() {
@@ -322,6 +333,10 @@ impl Planner<'_> {
                 .with("out of range", scene.lights.len() - dark - proxies - useful_lights),
         };
         decisions.decide(EffectId::PunctualLights, counts(cause.clone()));
+        let cause = match samples.have_extent() && !*paths && !cause.called_for {
+            true => Cause::of("lights with an extent are sampled"),
+            false => cause,
+        };
         let shadows = decisions.decide_with(
             EffectId::Shadows,
             knobs.shadows.choice().allows(knobs.shadows != Shadows::Off),
@@ -337,35 +352,42 @@ impl Planner<'_> {
     }
 
     /// Path tracing: indirect light between surfaces.
-    fn paths(&mut self) -> Option<Paths> {
-        let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
+    fn path_tracing(&mut self) -> bool {
+        let Self { surfaces, decisions, knobs, paths, .. } = self;
         let cause = match surfaces.any(|m| !m.unlit) {
             true => Cause::of("surfaces scatter light onto each other"),
             false => Cause::when(*paths, "indirect=path is set", "no visible surface scatters light"),
         };
-        let kept = decisions.decide_with(EffectId::PathTracing, knobs.indirect.choice().allows(*paths), cause);
-        let sends_light = |m: &Material| match m.unlit {
-            true => m.base_color[..3] != [0.0; 3],
-            false => m.emissive != [0.0; 3],
+        decisions.decide_with(EffectId::PathTracing, knobs.indirect.choice().allows(*paths), cause)
+    }
+
+    /// Light sampling. Paths sample all lights, and find emission of any kind; other models sample lights with an extent.
+    fn light_samples(&mut self, followed: bool) -> LightSamples {
+        let Self { scene, surfaces, decisions, knobs, paths, .. } = self;
+        let lit = surfaces.any(|m| !m.unlit);
+        let sends_light = |m: &Material| match *paths {
+            true if m.unlit => m.base_color[..3] != [0.0; 3],
+            true => m.emissive != [0.0; 3],
+            false => is_emitter(m),
         };
-        let cause = match kept {
+        let cause = match lit {
             true => surfaces.cause(sends_light, |m| {
                 if m.unlit { "is unlit and emits its base colour" } else { "emits light" }.to_owned()
             }),
-            false => Cause::against("path tracing is off"),
+            false => Cause::against("no visible surface scatters light"),
         };
         let by_lights = knobs.lights.choice().allows(knobs.lights != rungs::Lights::Points);
         let emitting = decisions.decide_with(EffectId::EmissiveLights, by_lights, cause);
         let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
-        let cause = match (kept, shaped) {
-            (false, _) => Cause::against("path tracing is off"),
+        let cause = match (lit, shaped) {
+            (false, _) => Cause::against("no visible surface scatters light"),
             (_, None) => Cause::against("no light has an area"),
             (_, Some(light)) => Cause::of(format!("light \"{}\" has an area", light.name)),
         };
         let shaped = decisions.decide_with(EffectId::AreaLights, by_lights, cause);
-        let count = bounded(scene, emitting);
-        let cause = match kept {
-            false => Cause::against("path tracing is off"),
+        let count = bounded(scene, emitting, |light| followed || (shaped && light.extent.is_some()));
+        let cause = match followed || emitting || shaped {
+            false => Cause::against("no lights are sampled"),
             true => Cause::when(
                 count >= HIERARCHY_FROM,
                 format!("{count} lights and emissive triangles have a place"),
@@ -378,29 +400,33 @@ impl Planner<'_> {
             knobs.light_sampler.choice().allows(knobs.light_sampler != LightSampler::Power),
             cause,
         );
-        let smooth = surfaces.cause(is_smooth, |m| {
-            let does = if m.transmission > 0.0 { "refracts" } else { "reflects" };
-            format!("{does} light specularly")
-        });
+        let count = if *paths || emitting || shaped { knobs.lights.samples() } else { 0 };
+        LightSamples { emitting, shaped, hierarchy, count }
+    }
+
+    fn path_guiding(&mut self, followed: bool, samples: LightSamples) -> bool {
+        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
         let around = surroundings.environment && !surroundings.constant;
-        let cause = match (kept, emitting || around) {
+        let cause = match (followed, samples.emitting || around) {
             (false, _) => Cause::against("path tracing is off"),
             (_, false) => Cause::against("no light can be hit by a path"),
-            _ => smooth,
+            _ => surfaces.cause(is_smooth, |m| {
+                let does = if m.transmission > 0.0 { "refracts" } else { "reflects" };
+                format!("{does} light specularly")
+            }),
         };
-        let guided = decisions.decide_with(
+        decisions.decide_with(
             EffectId::PathGuiding,
             knobs.guiding.choice().allows(knobs.guiding != Guiding::Off),
             cause,
-        );
-        paths.then_some(Paths { emitting, shaped, hierarchy, guided, photons: 0 })
+        )
     }
 
-    /// Adds the photons of punctual lights to path tracing: no path reaches such a light by way of a smooth surface.
-    fn caustics(&mut self, paths: Option<Paths>, lights: &Lights) -> Option<Paths> {
+    /// Photons of punctual lights in path tracing: no path reaches such a light by way of a smooth surface.
+    fn caustics(&mut self, followed: bool, lights: &Lights) -> u32 {
         let Self { scene, surfaces, decisions, knobs, .. } = self;
-        let cause = match (paths, lights.directional + lights.local) {
-            (None, _) => Cause::against("path tracing is off"),
+        let cause = match (followed, lights.directional + lights.local) {
+            (false, _) => Cause::against("path tracing is off"),
             (_, 0) => Cause::against("no punctual light shines"),
             _ => surfaces.cause(
                 |m| deflects(scene, m),
@@ -412,7 +438,7 @@ impl Planner<'_> {
         };
         let photons = knobs.caustics.photons();
         let kept = decisions.decide_with(EffectId::Caustics, knobs.caustics.choice().allows(photons > 0), cause);
-        paths.map(|paths| Paths { photons: if kept { photons } else { 0 }, ..paths })
+        if kept { photons } else { 0 }
     }
 
     /// Number of bands of wavelengths, and whether dispersion splits rays by wavelength.
@@ -453,12 +479,19 @@ impl Planner<'_> {
     }
 
     /// The kinds of rays, and the shader code for the surfaces that they can hit.
-    fn rays(&mut self, transmission: &Transmission, images: &MirrorImages, lights: &Lights) -> Option<Rays> {
+    fn rays(
+        &mut self,
+        transmission: &Transmission,
+        images: &MirrorImages,
+        lights: &Lights,
+        samples: LightSamples,
+    ) -> Option<Rays> {
         let Self { surfaces, decisions, knobs, surroundings, paths, .. } = self;
-        let shadows = lights.shadows && knobs.shadows == Shadows::Ray;
+        // Shadow maps are drawn from points: lights with an extent cast their shadows by rays on both rungs.
+        let shadows = lights.shadows && (knobs.shadows == Shadows::Ray || (samples.have_extent() && !*paths));
         let (refraction, mirrors) = (transmission.by_rays, images.by_rays);
         let occlusion = images.occlusion;
-        if !(shadows || mirrors || refraction || *paths || occlusion > 0) {
+        if !(shadows || mirrors || refraction || *paths || occlusion > 0 || samples.have_extent()) {
             return None;
         }
         let holes = |m: &Material| matches!(m.alpha_mode, AlphaMode::Mask(_));

@@ -56,6 +56,8 @@ pub struct Plan {
     pub shadow_maps: bool,
     /// Ray tracing with the BVH; `None` when no pass sends rays.
     pub rays: Option<Rays>,
+    /// Lights that are sampled: those with an extent in every model, and all of them in path tracing.
+    pub light_samples: LightSamples,
     /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from punctual lights,
     /// and recursive rays from smooth surfaces.
     pub paths: Option<Paths>,
@@ -141,15 +143,30 @@ pub enum Attenuation {
     Path,
 }
 
-/// Settings of path tracing (knob `indirect`).
+/// Light sampling: next event estimation towards points on lights (knobs `lights` and `light-sampler`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Paths {
-    /// Emissive surfaces light the scene (knob `lights`); otherwise they are only visible.
+pub struct LightSamples {
+    /// Emissive surfaces light the scene; otherwise they are only visible.
     pub emitting: bool,
     /// Some light is an analytic area light.
     pub shaped: bool,
-    /// Lights are sampled by a light hierarchy (knob `light-sampler`).
+    /// Lights are sampled by a light hierarchy.
     pub hierarchy: bool,
+    /// Light samples of each surface, for each sample of a pixel.
+    pub count: u32,
+}
+
+impl LightSamples {
+    /// Whether some light has an extent.
+    #[must_use]
+    pub fn have_extent(&self) -> bool {
+        self.emitting || self.shaped
+    }
+}
+
+/// Settings of path tracing (knob `indirect`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Paths {
     /// Path guiding with photons.
     pub guided: bool,
     /// Photons of each sample for the photon map of punctual lights; 0 without one.

@@ -104,7 +104,8 @@ pub(super) fn mean(rgb: [f32; 3]) -> f64 {
 }
 
 /// Whether next event estimation samples a surface: it emits, and neither alpha nor a coat modifies its emission.
-fn is_emitter(material: &Material) -> bool {
+#[must_use]
+pub fn is_emitter(material: &Material) -> bool {
     !material.unlit
         && material.emissive.iter().any(|&c| c > 0.0)
         && material.alpha_mode == AlphaMode::Opaque
@@ -128,6 +129,17 @@ impl Emitters {
     /// The distribution for a scene, its environment and, with `surfaces`, its emissive triangles.
     #[must_use]
     pub fn of(scene: &Scene, environment: Option<Sky>, surfaces: bool) -> Self {
+        Self::among(scene, environment, |_| true, surfaces)
+    }
+
+    /// The distribution over the lights of a scene that have an extent: with `shaped` its analytic area lights, with
+    /// `surfaces` its emissive triangles.
+    #[must_use]
+    pub fn with_extent(scene: &Scene, shaped: bool, surfaces: bool) -> Self {
+        Self::among(scene, None, |light| shaped && light.extent.is_some(), surfaces)
+    }
+
+    fn among(scene: &Scene, environment: Option<Sky>, is_among: impl Fn(&Light) -> bool, surfaces: bool) -> Self {
         use std::f64::consts::PI;
         let radius = scene.bounds().map_or(1.0, |bounds| bounds.radius());
         let mut sources = Vec::new();
@@ -143,7 +155,7 @@ impl Emitters {
                 weights.push(PI * radius * radius * 4.0 * PI * radiance);
             }
         }
-        for (i, light) in scene.lights.iter().enumerate().filter(|(_, light)| light.shines()) {
+        for (i, light) in scene.lights.iter().enumerate().filter(|(_, light)| light.shines() && is_among(light)) {
             sources.push(EmitterSource::Punctual(i as u32));
             weights.push(power(light, radius));
         }
@@ -163,11 +175,12 @@ impl Emitters {
     }
 }
 
-/// Number of emitters of a scene that have a place: all but the environment and directional lights.
+/// Number of emitters of a scene that have a place: its lights that `is_among` takes, but for directional ones, and with
+/// `surfaces` its emissive triangles.
 #[must_use]
-pub fn bounded(scene: &Scene, surfaces: bool) -> usize {
+pub fn bounded(scene: &Scene, surfaces: bool, is_among: impl Fn(&Light) -> bool) -> usize {
     let local = |light: &&Light| {
-        light.shines() && !matches!(light.kind, LightKind::Directional { .. }) && !(light.proxy && surfaces)
+        light.shines() && is_among(light) && !matches!(light.kind, LightKind::Directional { .. }) && !(light.proxy && surfaces)
     };
     let triangles = |instance: &Instance| {
         let mesh = &scene.meshes[instance.mesh];

@@ -1,5 +1,5 @@
-//! The light sampling tables of path tracing on the device (shaders/lib/emitters.glsl): emitters with their CDF, light
-//! hierarchy, environment CDF.
+//! The light sampling tables on the device (shaders/lib/emitters.glsl and light_sampling.glsl): emitters with their CDF,
+//! light hierarchy, environment CDF.
 //!
 //! [`crate::transport::emitters`] and [`crate::transport::light_hierarchy`] compute them.
 
@@ -16,16 +16,17 @@ use crate::share::{
 use crate::transport::emitters::{EmitterSource, Emitters};
 use crate::transport::light_hierarchy::LightHierarchy;
 
-/// The light sampling tables; dummies without lights.
+/// The light sampling tables; dummies without lights. The emitters follow the triangles of the BVH in their buffer:
+/// one [`Emitter`] per light, ordered by the CDF. With a light hierarchy its bin comes before the emitters in it, and its
+/// nodes come last.
 pub struct EmittersOnDevice {
-    /// One [`Emitter`] per light, ordered by the CDF. With a light hierarchy its bin comes before the emitters in it,
-    /// and its nodes come last.
-    pub table: Buffer,
     /// The environment CDF: marginal over rows, then conditional over columns.
     pub sky: Buffer,
     /// Number of bins of the CDF.
     pub count: u32,
-    /// Texel of the root of the light hierarchy, if there is one.
+    /// Texel of the first emitter in the buffer of triangles.
+    pub first: u32,
+    /// Texel of the root of the light hierarchy there, if there is one.
     pub nodes: Option<u32>,
     /// Whether some entries are punctual or analytic area lights.
     pub punctual: bool,
@@ -38,7 +39,8 @@ pub struct EmittersOnDevice {
 }
 
 impl EmittersOnDevice {
-    /// Uploads the tables; `leaf_places` maps the scene's triangles to their index among the BVH's leaves.
+    /// Uploads the environment CDF, and adds the other tables to the texels of the triangles; `leaf_places` maps the
+    /// scene's triangles to their index among the BVH's leaves.
     ///
     /// # Errors
     /// When memory is short.
@@ -47,7 +49,9 @@ impl EmittersOnDevice {
         emitters: &Emitters,
         leaf_places: &[u32],
         hierarchy: Option<&LightHierarchy>,
+        triangle_texels: &mut Vec<[u32; 4]>,
     ) -> Result<Self> {
+        let first = triangle_texels.len() as u32;
         let shared = |emitter: &crate::transport::emitters::Emitter| {
             let (kind, place) = match emitter.source {
                 EmitterSource::Environment => (EMITTER_ENVIRONMENT, 0),
@@ -72,11 +76,11 @@ impl EmittersOnDevice {
             count = *first as u32 + 1;
         }
         let nodes: &[LightNode] = hierarchy.map_or(&[], |hierarchy| &hierarchy.nodes);
-        let table = [bytemuck::cast_slice::<_, u8>(&list), bytemuck::cast_slice(nodes)].concat();
+        triangle_texels.extend_from_slice(bytemuck::cast_slice(&list));
+        triangle_texels.extend_from_slice(bytemuck::cast_slice(nodes));
         let any = |test: fn(&EmitterSource) -> bool| emitters.list.iter().any(|emitter| test(&emitter.source));
         let name = |named: &'static str, empty: bool| if empty { NOTHING } else { named };
         Ok(Self {
-            table: upload(device, name("emitters", list.is_empty()), &table, Some(vk::Format::R32G32B32A32_UINT))?,
             sky: upload(
                 device,
                 name("shares of the environment", emitters.environment.words.is_empty()),
@@ -84,7 +88,8 @@ impl EmittersOnDevice {
                 Some(vk::Format::R32_UINT),
             )?,
             count,
-            nodes: hierarchy.map(|_| list.len() as u32),
+            first,
+            nodes: hierarchy.map(|_| first + list.len() as u32),
             punctual: any(|source| matches!(source, EmitterSource::Punctual(_))),
             triangles: any(|source| matches!(source, EmitterSource::Triangle { .. })),
             columns: emitters.environment.columns,

@@ -108,7 +108,7 @@ impl Default for TraceConstants {
 pub struct RaysOnDevice {
     /// Nodes of all node lists.
     pub nodes: Buffer,
-    /// One [`BvhTriangle`] per triangle.
+    /// One [`BvhTriangle`] per triangle, then the emitters.
     pub triangles: Buffer,
     /// Shading data of the triangles' corners: [`share::Corners`] as far as the scene needs them.
     pub corners: Buffer,
@@ -193,7 +193,7 @@ impl RaysOnDevice {
         for (place, t) in bvh.triangles.iter().enumerate() {
             leaf_places[(first_triangle[t.instance as usize] + t.primitive) as usize] = place as u32;
         }
-        let by_place = plan.paths.is_some_and(|paths| paths.hierarchy).then(|| {
+        let by_place = plan.light_samples.hierarchy.then(|| {
             let corners_of = |index: u32| {
                 let t = bvh.triangles.get(leaf_places[index as usize] as usize)?;
                 Some(corners.order(t).map(|i| glam::Vec3::from(t.corners[i]).as_dvec3()))
@@ -211,7 +211,7 @@ impl RaysOnDevice {
             }
         }
         // Triangles in leaf order, with the front counter-clockwise also where the instance is mirrored.
-        let triangles: Vec<BvhTriangle> = bvh
+        let leaves: Vec<BvhTriangle> = bvh
             .triangles
             .par_iter()
             .zip(filters.par_iter().zip(&faces))
@@ -227,6 +227,9 @@ impl RaysOnDevice {
         let grid = bvh.grid();
         let format = Some(vk::Format::R32G32B32A32_UINT);
         let nodes_buffer = upload(device, "BVH nodes", &nodes, format)?;
+        let mut triangles: Vec<[u32; 4]> = bytemuck::cast_slice(&leaves).to_vec();
+        let emitters_on_device =
+            EmittersOnDevice::new(device, emitters, &leaf_places, by_place.as_ref(), &mut triangles)?;
         let triangle_buffer = upload(device, "BVH triangles", &triangles, format)?;
         let corner_buffer = upload(device, "corners for rays", &hit_corners, format)?;
         let fixed = TraceTerms {
@@ -264,13 +267,14 @@ impl RaysOnDevice {
             triangles: triangle_buffer,
             corners: corner_buffer,
             faces,
-            emitters: EmittersOnDevice::new(device, emitters, &leaf_places, by_place.as_ref())?,
+            emitters: emitters_on_device,
             guiding: match plan.paths.is_some_and(|paths| paths.guided) {
                 true => GuidingOnDevice::new(device, &PhotonGuiding::of(scene, solids, bvh, emitters))?,
                 false => GuidingOnDevice::none(device)?,
             },
             photons: match plan.paths {
-                Some(Paths { photons, shaped, .. }) if photons > 0 => {
+                Some(Paths { photons, .. }) if photons > 0 => {
+                    let shaped = plan.light_samples.shaped;
                     let around = |p_world| media_around(scene, solids, p_world);
                     PhotonsOnDevice::new(device, PhotonEmission::new((scene, solids, bvh), shaped, photons, around))?
                 }
@@ -295,7 +299,7 @@ impl RaysOnDevice {
             corners: nothing(vk::Format::R32G32B32A32_UINT)?,
             faces: Vec::new(),
             leaf_places: Buffer::new(device, NOTHING, 0, Place::Device)?,
-            emitters: EmittersOnDevice::new(device, &Emitters::default(), &[], None)?,
+            emitters: EmittersOnDevice::new(device, &Emitters::default(), &[], None, &mut Vec::new())?,
             guiding: GuidingOnDevice::none(device)?,
             photons: PhotonsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,

@@ -61,7 +61,7 @@ impl<'a> OnDevice<'a> {
     fn path_entries(&self) -> Vec<(u32, Resource<'a>)> {
         let RaysOnDevice { emitters, guiding, photons, .. } = self.rays;
         [
-            lib::emitters::Paths { emitters: &emitters.table, environment_cdf: &emitters.sky }.entries(),
+            lib::light_sampling::Paths { environment_cdf: &emitters.sky }.entries(),
             lib::path_guiding::Paths { guiding_cells: &guiding.cells, guiding_spheres: &guiding.spheres }.entries(),
             lib::photon_map::Paths { photon_map: &photons.map }.entries(),
         ]
@@ -104,11 +104,15 @@ impl<'a> OnDevice<'a> {
                 emitters: emitters.count,
                 emitter_search_steps: binary_search_steps(emitters.count),
                 punctual_emitters: emitters.punctual,
-                area_emitters: paths.shaped && emitters.punctual,
+                area_emitters: plan.light_samples.shaped && emitters.punctual,
                 emissive_triangles: emitters.triangles,
-                sampled_environment: emitters.rows > 0,
                 light_hierarchy: emitters.nodes.is_some(),
+                first_emitter: emitters.first,
                 light_nodes: emitters.nodes.unwrap_or(0),
+                light_samples: plan.light_samples.count,
+            },
+            light_sampling: lib::light_sampling::Constants {
+                sampled_environment: emitters.rows > 0,
                 cdf_columns: emitters.columns,
                 cdf_rows: emitters.rows,
                 cdf_search_steps: binary_search_steps(emitters.columns.max(emitters.rows)),
@@ -149,7 +153,7 @@ impl<'a> OnDevice<'a> {
                 true => lib::loops::Constants::default(),
                 false => lib::loops::Constants { loop_budget: u32::MAX },
             },
-            path: lib::path::Constants { emissive_lights: paths.emitting, light_samples: knobs.lights.places() },
+            path: lib::path::Constants { emissive_lights: plan.light_samples.emitting },
             photon_map: lib::photon_map::Constants { photon_map: paths.photons > 0 },
             path_state: lib::path_state::Constants {
                 keeps_media: with.transmissive,

@@ -179,18 +179,17 @@ impl Subject<'_> {
 /// tracing needs.
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
-    let by_lights = [Lights::Area1.choice(), LightSampler::Hierarchy.choice(), Guiding::Photons.choice()];
     match effect {
         EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
         EffectId::PathTracing => paths.into(),
         EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
-        EffectId::EmissiveLights | EffectId::AreaLights | EffectId::LightHierarchy | EffectId::PathGuiding => {
-            [&paths[..], &by_lights].concat()
+        EffectId::EmissiveLights | EffectId::AreaLights | EffectId::LightHierarchy => {
+            vec![Lights::Area4.choice(), LightSampler::Hierarchy.choice()]
         }
+        EffectId::PathGuiding => [&paths[..], &[Lights::Area1.choice(), Guiding::Photons.choice()]].concat(),
         EffectId::Caustics => [&paths[..], &[Caustics::Photons16384.choice()]].concat(),
         _ if dropped_by == Indirect::Path.choice() => {
-            let without = [LightSampler::Power.choice(), Guiding::Off.choice(), Caustics::Off.choice()];
-            [&[Indirect::Ambient.choice(), Lights::Points.choice()][..], &without].concat()
+            vec![Indirect::Ambient.choice(), Guiding::Off.choice(), Caustics::Off.choice()]
         }
         _ => {
             let recursive = Knobs::of(Model::Recursive);

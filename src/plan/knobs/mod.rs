@@ -7,7 +7,7 @@ pub mod rungs;
 
 use super::refused::{Refused, Setting};
 use anyhow::Result;
-use rungs::{Caustics, Guiding, Indirect, LightSampler, Lights, Reflection, Refraction, Shadows};
+use rungs::{Caustics, Guiding, Indirect, Reflection, Refraction, Shadows};
 pub use rungs::{KNOBS, Knob, Knobs, Model};
 
 impl Knob {
@@ -95,7 +95,7 @@ impl Knobs {
     /// # Errors
     /// One sentence with both and the nearest choice.
     pub fn check(&self) -> Result<()> {
-        let Self { shadows, reflection, refraction, indirect, lights, light_sampler, guiding, caustics, .. } = *self;
+        let Self { shadows, reflection, refraction, indirect, guiding, caustics, .. } = *self;
         if indirect == Indirect::Path {
             let other = [
                 (shadows != Shadows::Ray).then(|| (shadows.to_string(), Shadows::Ray.to_string())),
@@ -105,19 +105,9 @@ impl Knobs {
             if let Some((chosen, nearest)) = other.into_iter().flatten().next() {
                 return Err(refused(format!(
                     "{chosen} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
-                     {nearest}, or indirect=ambient with lights=points"
+                     {nearest}, or indirect=ambient"
                 )));
             }
-        } else if lights != Lights::Points {
-            return Err(refused(format!(
-                "{lights} contradicts {indirect}: surfaces light others along paths; the nearest choice is \
-                 indirect=path, or lights=points"
-            )));
-        } else if light_sampler != LightSampler::Power {
-            return Err(refused(format!(
-                "{light_sampler} contradicts {indirect}: only paths sample lights; the nearest choice is \
-                 indirect=path, or light-sampler=power"
-            )));
         } else if guiding != Guiding::Off {
             return Err(refused(format!(
                 "{guiding} contradicts {indirect}: only paths are guided; the nearest choice is indirect=path, or \

@@ -51,11 +51,11 @@ effects! {
     PathTracing = "path tracing":
         "`indirect=path`: paths take the place of the G-buffer, of lighting and of single rays" => "the BVH, queues, states of paths",
     EmissiveLights = "emissive surfaces as lights":
-        "an emissive surface, with `lights=area:N` and path tracing" => "a table of triangles; code",
+        "an emissive surface, with `lights=area:N`" => "the BVH, a table of triangles; code",
     AreaLights = "analytic area lights":
-        "a sphere, disk or rectangle light, with `lights=area:N` and path tracing" => "code",
+        "a sphere, disk or rectangle light, with `lights=area:N`" => "the BVH; code",
     LightHierarchy = "light hierarchy":
-        "3 point, spot and area lights or emissive triangles, with `light-sampler=hierarchy` and path tracing" => "a table of nodes; code",
+        "3 emissive triangles or area lights, in path tracing also point and spot lights, with `light-sampler=hierarchy`" => "a table of nodes; code",
     PathGuiding = "path guiding":
         "a smooth surface that light reaches and that sends it to a diffuse one, with `guiding=photons` and path tracing" => "photons, a grid of cells with bounding spheres; code",
     Caustics = "caustics of punctual lights":
@@ -414,7 +414,7 @@ impl Indirect {
 
 macro_rules! area_about {
     ($samples:literal) => {
-        concat!("Lights and emissive surfaces have their extent, with ", $samples, " at each vertex of a path.")
+        concat!("Lights and emissive surfaces have their extent, with ", $samples, " at each surface.")
     };
 }
 
@@ -429,17 +429,17 @@ knob! {
         #[doc = area_about!("16 samples")]
         Area16 = "area:16",
     }
-    presets: [Points, Points, Area1],
+    presets: [Points, Area4, Area1],
     exact: Area1,
     lecture: ["R2"],
     effects: [EmissiveLights, AreaLights],
-    about: "lights as points, or as area lights with N light samples at each path vertex",
+    about: "lights as points, or as area lights with N light samples at each surface that they light",
 }
 
 impl Lights {
-    /// Light samples at each path vertex.
+    /// Light samples at each surface.
     #[must_use]
-    pub fn places(self) -> u32 {
+    pub fn samples(self) -> u32 {
         number(self.name(), "area:").unwrap_or(1)
     }
 }
@@ -451,11 +451,11 @@ knob! {
         /// Lights are chosen by their importance at each surface, from a light hierarchy: less noise with many lights.
         Hierarchy = "hierarchy",
     }
-    presets: [Power, Power, Hierarchy],
+    presets: [Power, Hierarchy, Hierarchy],
     exact: Hierarchy,
     lecture: ["R4", "R6"],
     effects: [LightHierarchy],
-    about: "choice of a light at a path vertex: by power alone, or by a light hierarchy with distance and orientation; the same mean",
+    about: "choice of a light to sample at a surface: by power alone, or by a light hierarchy with distance and orientation; the same mean",
 }
 
 knob! {
@@ -671,7 +671,7 @@ mod tests {
             assert_eq!(rung.roughest().to_string(), rung.name());
         }
         assert_eq!(Absorption::RUNGS.iter().map(|rung| rung.steps()).collect::<Vec<_>>(), [0, 0, 0, 4, 8, 16, 32, 64]);
-        assert_eq!(Lights::RUNGS.iter().map(|rung| rung.places()).collect::<Vec<_>>(), [1, 1, 4, 16]);
+        assert_eq!(Lights::RUNGS.iter().map(|rung| rung.samples()).collect::<Vec<_>>(), [1, 1, 4, 16]);
         assert_eq!(Colour::RUNGS.iter().map(|rung| rung.bands()).collect::<Vec<_>>(), [0, 8, 16, 32]);
         assert_eq!(Guiding::Photons.to_string(), "guiding=photons");
         assert_eq!(Caustics::RUNGS.iter().map(|rung| rung.photons()).collect::<Vec<_>>(), [0, 4096, 16384, 65536]);
