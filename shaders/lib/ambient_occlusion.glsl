@@ -30,19 +30,27 @@ vec3 visibility_of_environment(Surface s, vec3 direction, bool wanted) {
     return visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, direction, LARGEST, wanted);
 }
 
-// Share of the irradiance that arrives. Directions between the triangle's plane and that of the interpolated normal count
+struct VisibleIrradiance {
+    vec3 share;    // of the irradiance that arrives
+    vec3 occluded; // sum of the occluded directions, weighted by their cosines
+};
+
+// Directions between the triangle's plane and that of the interpolated normal count
 // nowhere: a smooth convex mesh does not occlude itself.
-vec3 visible_irradiance(Surface s) {
+VisibleIrradiance visible_irradiance(Surface s) {
     vec3 seen = vec3(0.0);
     vec3 all = vec3(0.0);
+    vec3 occluded = vec3(0.0);
     for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
         float cos_l = dot(s.n_triangle, sky.direction) > 0.0 ? max(dot(s.n, sky.direction), 0.0) : 0.0;
         vec3 weight = light_of_environment(sky.weight) * cos_l;
-        seen += weight * visibility_of_environment(s, sky.direction, cos_l > 0.0);
+        vec3 visible = visibility_of_environment(s, sky.direction, cos_l > 0.0);
+        seen += weight * visible;
         all += weight;
+        occluded += sky.direction * (cos_l * (1.0 - mean(visible)));
     }
-    return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+    return VisibleIrradiance(mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0))), occluded);
 }
 
 // Share of a specular lobe that sees the environment, by the weights of its directions. An anisotropic lobe counts as a
@@ -61,14 +69,16 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
-// Irradiance in a concavity of this albedo: `irradiance` without occluders, of which the share `visible` arrives. Here and
+// Irradiance E of a surface and E' of what occludes it, by an exchange between the two: E = V E₀ + q E' and E' = V E₀' + q E
+// with q = ρ (1 − V). E₀ and E₀' are the irradiance without occluders. Here and
 // below every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two
 // ways, by what else stands in the program.
-vec3 concavity_irradiance(vec3 irradiance, vec3 visible, vec3 albedo) {
+vec3 exchanged_irradiance(vec3 irradiance, vec3 other, vec3 visible, vec3 albedo) {
     precise vec3 occluded = 1.0 - visible;
     precise vec3 given_back = min(albedo, 0.98) * occluded;
-    precise vec3 kept = 1.0 - given_back;
-    precise vec3 arriving = irradiance * visible;
+    precise vec3 kept = 1.0 - given_back * given_back;
+    precise vec3 both = irradiance + other * given_back;
+    precise vec3 arriving = both * visible;
     return arriving / kept;
 }
 
@@ -85,10 +95,14 @@ vec3 occluded_environment_light(Surface s) {
     // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
     precise vec3 diffuse = scattered_radiance(s, albedo, vec3(1.0)) * PI;
     precise vec3 all = diffuse + albedo.base;
-    vec3 unoccluded = environment_irradiance(s.n);
-    vec3 irradiance = concavity_irradiance(unoccluded, visible_irradiance(s), all);
+    vec3 here = environment_irradiance(s.n);
+    VisibleIrradiance seen = visible_irradiance(s);
+    float occluded = dot(seen.occluded, seen.occluded);
+    // What occludes faces this surface.
+    vec3 there = environment_irradiance(occluded > 0.0 ? -seen.occluded * inversesqrt(occluded) : s.n);
+    vec3 irradiance = exchanged_irradiance(here, there, seen.share, all);
     // The radiance of what occludes.
-    precise vec3 given_back = min(all, 0.98) * irradiance;
+    precise vec3 given_back = min(all, 0.98) * exchanged_irradiance(there, here, seen.share, all);
     precise vec3 beside = given_back * INV_PI;
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
