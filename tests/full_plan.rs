@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use etalon::frame::{Renderer, Settings};
 use etalon::image::Picture;
+use etalon::plan::rungs::Indirect;
 use etalon::plan::{Effect, EffectState, ForcedEffects, Knobs, Model};
 use etalon::scene::camera::DEFAULT_FOV_Y;
 use etalon::scene::environment::Environment;
@@ -37,14 +38,18 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, forced: ForcedEffects) -> (Pict
 
 /// Effects that no demand includes: each makes another picture, or one with other noise or roundings, wherever it is.
 const APART: [&str; 4] = ["coincident interfaces", "light hierarchy", "spectral rendering", "dispersion"];
+/// Those that only paths include.
+const SAMPLED: [&str; 2] = ["emissive surfaces as lights", "analytic area lights"];
 
 /// Both plans of a scene as it was loaded for each. Everything is kept in the one but what a knob drops, and what
 /// stands apart.
 fn is_the_same(gpu: &Gpu, name: &str, [lean, full]: [&Scene; 2], knobs: &Knobs) {
     let (planned, _) = draw(gpu, lean, knobs, ForcedEffects::None);
     let (everything, effects) = draw(gpu, full, knobs, ForcedEffects::All);
+    let by_paths = knobs.indirect == Indirect::Path;
     for effect in effects.iter().filter(|effect| effect.state == EffectState::NotCalledFor) {
-        assert!(APART.contains(&effect.id.name()), "{name}: {}: {}", effect.id.name(), effect.reason());
+        let stands_apart = |id: &str| APART.contains(&id) || (!by_paths && SAMPLED.contains(&id));
+        assert!(stands_apart(effect.id.name()), "{name}: {}: {}", effect.id.name(), effect.reason());
     }
     let different = bits(&planned).iter().zip(bits(&everything)).filter(|(a, b)| *a != b).count();
     assert_eq!(different, 0, "{name}: pixels that differ");
@@ -121,11 +126,9 @@ fn each_effect_alone() {
             let (with, account) = draw(&gpu, &scene, &knobs, ForcedEffects::One(effect.id));
             assert!(bits(&planned) == bits(&with), "{name}: {}", effect.id.name());
             let kept = account.iter().filter(|kept| kept.id == effect.id && kept.state == EffectState::Kept).count();
-            // Surfaces light others along paths alone, and so do lights with a shape.
-            let of_paths =
-                ["path guiding", "caustics of punctual lights", "emissive surfaces as lights", "analytic area lights"];
-            let is_dropped = of_paths.contains(&effect.id.name());
-            let kept_alone = !is_dropped && !APART.contains(&effect.id.name());
+            let of_paths = ["path guiding", "caustics of punctual lights"];
+            let stays = [&of_paths[..], &APART, &SAMPLED].concat();
+            let kept_alone = !stays.contains(&effect.id.name());
             assert_eq!(kept, usize::from(kept_alone), "{name}: {}", effect.id.name());
         }
     }

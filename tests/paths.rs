@@ -16,7 +16,14 @@ use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
 
 fn settings(size: [u32; 2], choices: &[&str]) -> Settings {
-    let mut knobs = Knobs::of(Model::Global);
+    settings_of(Model::Global, size, choices)
+}
+
+/// Next event estimation is the same in every model.
+const MODELS: [Model; 3] = [Model::Local, Model::Recursive, Model::Global];
+
+fn settings_of(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
+    let mut knobs = Knobs::of(model);
     let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
     knobs.set_all(&choices).expect("rungs");
     Settings { size, knobs, ..Settings::default() }
@@ -88,11 +95,13 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
         ("ball around it", Extent::Sphere { radius: 1.5 }, point, 0.0),
     ] {
         let (scene, radiance) = under(light(Some(extent), kind), expected);
-        let film = draw(&gpu, &scene, None, settings([16, 16], &["samples=64"]));
-        let [mean, deviation, _] = spread(&film, 1);
-        eprintln!("{what}: {mean:.6} ± {deviation:.6}, expected {radiance:.6}");
-        // Neighbouring pixels have points of their own; the floor reaches 0.01 m from its middle.
-        assert!((mean - radiance).abs() <= 4.0 * deviation + 2e-4 * radiance, "{what}: {mean}, not {radiance}");
+        for model in MODELS {
+            let film = draw(&gpu, &scene, None, settings_of(model, [16, 16], &["samples=64", "lights=area:1"]));
+            let [mean, deviation, _] = spread(&film, 1);
+            eprintln!("{what}, {model:?}: {mean:.6} ± {deviation:.6}, expected {radiance:.6}");
+            // Neighbouring pixels have points of their own; the floor reaches 0.01 m from its middle.
+            assert!((mean - radiance).abs() <= 4.0 * deviation + 2e-4 * radiance, "{what}: {mean}, not {radiance}");
+        }
         // The rung `points` knows no shapes.
         let film = draw(&gpu, &scene, None, settings([4, 4], &["samples=1", "lights=points"]));
         let mut bare = scene.clone();
@@ -142,7 +151,9 @@ fn shapes_cast_soft_shadows() {
     let extent = Some(Extent::Rectangle { across: DVec3::X * 0.5, half_height: 0.5 });
     let light = Light { name: "lamp".to_owned(), color: [2.0; 3], spectrum: None, extent, kind, proxy: false };
     let (mut scene, _) = under(light, 0.0);
-    let open = draw(&gpu, &scene, None, settings([8, 8], &["samples=256"]));
+    let lit =
+        |scene: &Scene, model| draw(&gpu, scene, None, settings_of(model, [8, 8], &["samples=256", "lights=area:1"]));
+    let open = MODELS.map(|model| lit(&scene, model));
     let mut made = Made(scene.clone());
     // Black, half way up, over all of one side.
     made.add(Shape::panel(4.0, 4.0), lambert([0.0; 3]), at(2.0, 0.0, 0.5));
@@ -150,9 +161,17 @@ fn shapes_cast_soft_shadows() {
     // The eye is below the wall.
     scene.cameras[0].world_from_camera.translation.z = 0.4;
     scene.cameras[0].projection = Projection::Orthographic { half_height: 0.008, near: 0.1, far: 2.0 };
-    let half = draw(&gpu, &scene, None, settings([8, 8], &["samples=256"]));
-    let ([open, ..], [half, deviation, _]) = (spread(&open, 1), spread(&half, 1));
-    assert!((half - 0.5 * open).abs() < 4.0 * deviation + 1e-3 * open, "{half} of {open}");
+    for (model, open) in MODELS.into_iter().zip(open) {
+        let ([open, ..], [half, deviation, _]) = (spread(&open, 1), spread(&lit(&scene, model), 1));
+        assert!((half - 0.5 * open).abs() < 4.0 * deviation + 1e-3 * open, "{model:?}: {half} of {open}");
+    }
+    // Shadow maps are drawn from points; this light has rays all the same. Without shadows it is seen through the wall.
+    let share = |shadows: &str| {
+        let choices = ["samples=64", "lights=area:4", shadows];
+        spread(&draw(&gpu, &scene, None, settings_of(Model::Recursive, [8, 8], &choices)), 1)[0]
+    };
+    let (by_maps, by_rays) = (share("shadows=map"), share("shadows=ray"));
+    assert!(by_maps == by_rays && share("shadows=off") > 1.9 * by_rays, "{by_maps}, {by_rays}");
 }
 
 #[test]
@@ -231,12 +250,15 @@ fn squares_exchange_light_by_their_form_factor() {
     assert!((form_factor(1.0) - 0.199_824_89).abs() < 1e-7);
     for distance in [1.0, 0.5, 2.0] {
         let scene = parallel_squares(distance);
-        let picture = draw(&gpu, &scene, None, settings([24, 24], &["samples=64"]));
-        let [mean, _, _] = spread(&picture, 2);
-        // Pixels differ in truth as well: the error is that of another seed.
-        let other = draw(&gpu, &scene, None, Settings { seed: 1, ..settings([24, 24], &["samples=64"]) });
-        let noise: f64 = (mean - spread(&other, 2)[0]).abs().max(2e-4);
-        assert!((mean - form_factor(distance)).abs() < 4.0 * noise, "{distance}: {mean} for {}", form_factor(distance));
+        for model in MODELS {
+            let settings = || settings_of(model, [24, 24], &["samples=64", "lights=area:1"]);
+            let [mean, _, _] = spread(&draw(&gpu, &scene, None, settings()), 2);
+            // Pixels differ in truth as well: the error is that of another seed.
+            let other = draw(&gpu, &scene, None, Settings { seed: 1, ..settings() });
+            let noise: f64 = (mean - spread(&other, 2)[0]).abs().max(2e-4);
+            let expected = form_factor(distance);
+            assert!((mean - expected).abs() < 4.0 * noise, "{distance}, {model:?}: {mean} for {expected}");
+        }
     }
 }
 
@@ -399,8 +421,10 @@ fn what_lies_behind_tinted_glass_is_weakened_in_alpha() {
 fn emissive_surfaces_are_lights_only_where_a_knob_says_so() {
     let gpu = Gpu::open();
     let scene = parallel_squares(1.0);
-    let picture = draw(&gpu, &scene, None, settings([8, 8], &["samples=4", "lights=points"]));
-    assert_eq!(spread(&picture, 0)[2], 0.0);
+    for model in MODELS {
+        let picture = draw(&gpu, &scene, None, settings_of(model, [8, 8], &["samples=4", "lights=points"]));
+        assert_eq!(spread(&picture, 0)[2], 0.0);
+    }
     // It is seen all the same.
     let mut turned = scene;
     turned.cameras[0] = etalon::scene::Camera {

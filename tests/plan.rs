@@ -112,8 +112,8 @@ impl Case {
 
     fn check(self) -> [Drawn; 2] {
         let Self { effect, reason, scenes, environments, choices, brings, same } = self;
-        // Ambient occlusion is a case of its own: its rays would call for what other effects bring.
-        let choices = &[&["indirect=ambient"], choices].concat();
+        // Ambient occlusion and light samples are cases of their own: their rays would call for what other effects bring.
+        let choices = &[&["indirect=ambient", "lights=points", "light-sampler=power"], choices].concat();
         let [without, with] = [0, 1].map(|i| draw(&scenes[i].0, environments[i].as_ref(), choices));
         assert_eq!(state(&without.plan, effect), ("not needed", reason.to_owned()), "{effect}");
         assert_eq!(state(&with.plan, effect).0, "used", "{effect}: {}", state(&with.plan, effect).1);
@@ -517,17 +517,40 @@ fn the_light_hierarchy_brings_its_nodes() {
     let case = Case::new("light hierarchy", reason, lit(2, lamp), lit(3, lamp));
     let brings: &[&[&str]] =
         &[&["path.emitters", "path.emitter_search_steps", "path.light_hierarchy", "path.light_nodes"]];
+    let emitters = |drawn: &Drawn, other: &Drawn| drawn.objects["BVH triangles"] - other.objects["BVH triangles"];
+    let one = draw(&lit(1, lamp).0, None, paths);
     let [without, with] = Case { environments: [None, None], choices: paths, brings, same: false, ..case }.check();
     // Emitters of 16 bytes and nodes of 32: two emitters; the bin, three emitters and five nodes.
-    assert_eq!([&without, &with].map(|drawn| drawn.objects["emitters"]), [2 * 16, 4 * 16 + 5 * 32]);
+    assert_eq!([&without, &with].map(|drawn| emitters(drawn, &one) + 16), [2 * 16, 4 * 16 + 5 * 32]);
     // Where it is a knob's choice, and not of the lights that have no place.
     let switched_off = draw(&lit(3, lamp).0, None, &["indirect=path", "light-sampler=power"]);
     assert_eq!(state(&switched_off.plan, "light hierarchy"), ("switched off", "light-sampler=power".to_owned()));
-    assert_eq!(switched_off.objects["emitters"], 3 * 16);
+    assert_eq!(emitters(&switched_off, &one) + 16, 3 * 16);
     let sun = LightKind::Directional { direction: DVec3::NEG_Y };
     assert_eq!(state(&draw(&lit(3, sun).0, None, paths).plan, "light hierarchy"), ("not needed", reason.to_owned()));
     let apart = draw(&lit(3, lamp).0, None, &["indirect=ambient"]);
-    assert_eq!(state(&apart.plan, "light hierarchy"), ("not needed", "path tracing is off".to_owned()));
+    assert_eq!(state(&apart.plan, "light hierarchy"), ("not needed", "no lights are sampled".to_owned()));
+}
+
+/// Emissive surfaces as lights: their table lies behind the triangles of the BVH.
+#[test]
+fn lights_with_an_extent_bring_rays_and_samples() {
+    let lit = |glows: f32| {
+        let glowing =
+            Material { emissive: [glows; 3], base_color: [0.0, 0.0, 0.0, 1.0], specular: 0.0, ..Material::default() };
+        let mut made = ball(chalk(), None);
+        made.add(Shape::panel(1.0, 1.0), glowing, at(0.0, 0.0, 5.0));
+        made
+    };
+    let [without, with] = Case {
+        choices: &["lights=area:4"],
+        brings: &[HIERARCHY, &["light.emissive_triangles"]],
+        environments: [Some(Environment::studio()), Some(Environment::studio())],
+        same: false,
+        ..Case::new("emissive surfaces as lights", NONE, lit(0.0), lit(2.0))
+    }
+    .check();
+    assert_eq!([&without, &with].map(|drawn| drawn.plan.light_samples.count), [0, 4]);
 }
 
 /// Neither mirrors nor scattered light are needed for what is seen through glass: all that enters a ball leaves it,

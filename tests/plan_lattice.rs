@@ -93,6 +93,7 @@ const FACTORS: &[Factor] = &[
     Factor { name: "absorption", levels: &["off", "thickness", "path", "march:4"] },
     Factor { name: "quadrature", levels: &["left", "midpoint", "simpson"] },
     Factor { name: "indirect", levels: &["off", "ambient", "occlusion:4"] },
+    Factor { name: "lights", levels: &["points", "area:4"] },
     Factor { name: "arithmetic", levels: &["fast", "stable", "compensated"] },
     Factor { name: "environment", levels: &["none", "constant", "studio"] },
     Factor { name: "background", levels: &["default", "transparent"] },
@@ -556,6 +557,7 @@ const NEEDS: &[(&str, &str)] = &[
     ("tiled light culling", "punctual lights"),
     ("heterogeneous media", "absorption"),
     ("heterogeneous media", "refraction"),
+    ("emissive surfaces as lights", "emissive textures"),
     ("environment reflection", "environment"),
     ("prefiltered environment", "environment reflection"),
     ("quadrature", "heterogeneous media"),
@@ -574,7 +576,7 @@ fn any_two_effects_are_kept_together_and_apart() {
     let mut seen = BTreeSet::new();
     for (ways, choice) in spread() {
         let plan = planned(ways, choice, knobs(ways, choice));
-        let elsewhere = [OF_PATHS.as_slice(), &OF_WAVELENGTHS].concat();
+        let elsewhere = [OF_PATHS.as_slice(), &OF_LIGHTS, &OF_WAVELENGTHS].concat();
         for a in plan.effects.iter().filter(|effect| !elsewhere.contains(&effect.id.name())) {
             states.entry(a.id.name()).or_default().insert(a.state.name());
         }
@@ -602,21 +604,16 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths: kept nowhere without them.
-const OF_PATHS: [&str; 7] = [
-    "path guiding",
-    "caustics of punctual lights",
-    "rough transmission",
-    "analytic area lights",
-    "light hierarchy",
-    "path tracing",
-    "emissive surfaces as lights",
-];
+const OF_PATHS: [&str; 4] = ["path guiding", "caustics of punctual lights", "rough transmission", "path tracing"];
+
+/// Effects of more lights than are here: tests/light_samples.rs has them.
+const OF_LIGHTS: [&str; 2] = ["analytic area lights", "light hierarchy"];
 
 /// Effects of another rung of `colour`: tests/spectra.rs has them.
 const OF_WAVELENGTHS: [&str; 2] = ["spectral rendering", "dispersion"];
 
 /// Every other effect, except the one that only the hierarchy of triangles decides.
-const NAMES: [&str; 27] = [
+const NAMES: [&str; 28] = [
     "absorption",
     "alpha test in rays",
     "ambient light",
@@ -625,6 +622,7 @@ const NAMES: [&str; 27] = [
     "clear coat",
     "conductors with n and kappa",
     "diffuse transmission",
+    "emissive surfaces as lights",
     "emissive textures",
     "environment",
     "environment reflection",

@@ -5,8 +5,8 @@
 //    directions are, and neighbouring pixels have no noise between them.
 // 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
 //    radiance (split sum).
-// 3. Interreflection. An occluded direction sees another surface. It is taken to have the same albedo ρ and the same
-//    irradiance E as this one, as inside a concavity: E = V E₀ + (1 − V) ρ E, so E = V E₀ / (1 − ρ (1 − V)).
+// 3. Interreflection. What occludes the share O of the directions is taken to face this surface, to have the same albedo ρ,
+//    and to have the same share occluded by this surface, as inside a concavity: E = V E₀ + ρ O E', E' = (1 − O) E₀' + ρ O E.
 // Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities).
 // Assumes: bvh space, metres; a compensated surface.
 #ifndef AMBIENT_OCCLUSION_GLSL
@@ -31,8 +31,9 @@ vec3 visibility_of_environment(Surface s, vec3 direction, bool wanted) {
 }
 
 struct VisibleIrradiance {
-    vec3 share;    // of the irradiance that arrives
-    vec3 occluded; // sum of the occluded directions, weighted by their cosines
+    vec3 share;      // of the irradiance that arrives
+    vec3 occluded;   // share of the directions that occluders take, by cosine and solid angle
+    vec3 towards;    // sum of these directions
 };
 
 // Directions between the triangle's plane and that of the interpolated normal count
@@ -41,6 +42,8 @@ VisibleIrradiance visible_irradiance(Surface s) {
     vec3 seen = vec3(0.0);
     vec3 all = vec3(0.0);
     vec3 occluded = vec3(0.0);
+    vec3 towards = vec3(0.0);
+    float hemisphere = 0.0;
     for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
         float cos_l = dot(s.n_triangle, sky.direction) > 0.0 ? max(dot(s.n, sky.direction), 0.0) : 0.0;
@@ -48,9 +51,16 @@ VisibleIrradiance visible_irradiance(Surface s) {
         vec3 visible = visibility_of_environment(s, sky.direction, cos_l > 0.0);
         seen += weight * visible;
         all += weight;
-        occluded += sky.direction * (cos_l * (1.0 - mean(visible)));
+        float projected = cos_l * sky.measure;
+        hemisphere += projected;
+        occluded += projected * (1.0 - visible);
+        towards += sky.direction * (projected * (1.0 - mean(visible)));
     }
-    return VisibleIrradiance(mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0))), occluded);
+    VisibleIrradiance r;
+    r.share = mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+    r.occluded = occluded / max(hemisphere, 1e-30);
+    r.towards = towards;
+    return r;
 }
 
 // Share of a specular lobe that sees the environment, by the weights of its directions. An anisotropic lobe counts as a
@@ -69,17 +79,14 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
-// Irradiance E of a surface and E' of what occludes it, by an exchange between the two: E = V E₀ + q E' and E' = V E₀' + q E
-// with q = ρ (1 − V). E₀ and E₀' are the irradiance without occluders. Here and
-// below every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two
+// Irradiance of a surface and of what occludes it, in this order or the other: of each the irradiance that arrives, `here`
+// and `there`, and the share `given_back` of the other's. E = E₁ + q E' and E' = E₂ + q E, so E = (E₁ + q E₂)/(1 − q²). Here
+// and below every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two
 // ways, by what else stands in the program.
-vec3 exchanged_irradiance(vec3 irradiance, vec3 other, vec3 visible, vec3 albedo) {
-    precise vec3 occluded = 1.0 - visible;
-    precise vec3 given_back = min(albedo, 0.98) * occluded;
+vec3 exchanged_irradiance(vec3 here, vec3 there, vec3 given_back) {
     precise vec3 kept = 1.0 - given_back * given_back;
-    precise vec3 both = irradiance + other * given_back;
-    precise vec3 arriving = both * visible;
-    return arriving / kept;
+    precise vec3 both = here + there * given_back;
+    return both / kept;
 }
 
 // The radiance in a lobe of which the share `visible` sees the environment.
@@ -95,15 +102,16 @@ vec3 occluded_environment_light(Surface s) {
     // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
     precise vec3 diffuse = scattered_radiance(s, albedo, vec3(1.0)) * PI;
     precise vec3 all = diffuse + albedo.base;
-    vec3 here = environment_irradiance(s.n);
     VisibleIrradiance seen = visible_irradiance(s);
-    float occluded = dot(seen.occluded, seen.occluded);
-    // What occludes faces this surface.
-    vec3 there = environment_irradiance(occluded > 0.0 ? -seen.occluded * inversesqrt(occluded) : s.n);
-    vec3 irradiance = exchanged_irradiance(here, there, seen.share, all);
+    precise vec3 here = environment_irradiance(s.n) * seen.share;
+    // What occludes faces this surface, and is taken to be as open.
+    float size2 = dot(seen.towards, seen.towards);
+    precise vec3 there = environment_irradiance(size2 > 0.0 ? -seen.towards * inversesqrt(size2) : s.n) * (1.0 - seen.occluded);
+    precise vec3 kept = min(all, 0.98);
+    precise vec3 given_back = kept * seen.occluded;
+    vec3 irradiance = exchanged_irradiance(here, there, given_back);
     // The radiance of what occludes.
-    precise vec3 given_back = min(all, 0.98) * exchanged_irradiance(there, here, seen.share, all);
-    precise vec3 beside = given_back * INV_PI;
+    precise vec3 beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
     if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);

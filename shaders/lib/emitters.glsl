@@ -21,17 +21,16 @@ layout(constant) const bool PUNCTUAL_EMITTERS = false;   // some emitter is a li
 layout(constant) const bool AREA_EMITTERS = false;     // some light of the table is an analytic area light
 layout(constant) const bool EMISSIVE_TRIANGLES = false;  // some emitter is an emissive triangle
 layout(constant) const bool LIGHT_HIERARCHY = false;     // emitters with a place are chosen by their importance
-layout(constant) const uint FIRST_EMITTER = 0;           // texel of the first emitter, behind the triangles
-layout(constant) const uint LIGHT_NODES = 0;             // texel of the hierarchy's root, behind the emitters
+layout(constant) const uint LIGHT_NODES = 0;             // texel of the hierarchy's root, from the first emitter on
 layout(constant) const uint LIGHT_SAMPLES = 0;           // light samples (shadow rays) of each surface
 
 // The tables follow the triangles in their buffer: every pass that sends rays has room for it among its storage images.
 uvec4 emitter_texel(uint index, int texel) {
-    return imageLoad(bvh_triangles, int(FIRST_EMITTER + index) + texel);
+    return imageLoad(bvh_triangles, int(trace_terms.first_emitter + index) + texel);
 }
 // @texels Emitter emitter_at(emitter_texel)
 uvec4 light_node_texel(uint index, int texel) {
-    return imageLoad(bvh_triangles, int(LIGHT_NODES + 2u * index) + texel);
+    return imageLoad(bvh_triangles, int(trace_terms.first_emitter + LIGHT_NODES + 2u * index) + texel);
 }
 // @texels LightNode light_node_at(light_node_texel)
 

@@ -16,5 +16,6 @@ struct TraceTerms {
     vec2 snap;            // greatest error of a point rebuilt from depth, from vertex rounding: metres, and part of its distance
     uint sample_index;
     uint interfaces;      // greatest number of surfaces that a path may meet
+    uint first_emitter;   // texel of the first emitter, behind the triangles of the BVH (lib/emitters.glsl)
 };
 #endif

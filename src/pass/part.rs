@@ -59,7 +59,7 @@ impl PartOnDevice {
         if plan.paths.is_some() {
             let why = format!(
                 "{name}: this layer is what single rays bring, and indirect=path follows paths instead; choose indirect=ambient \
-                 and lights=points"
+                 with guiding=off and caustics=off"
             );
             return Err(Refused::error(Setting::Part, why));
         }

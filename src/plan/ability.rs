@@ -4,7 +4,7 @@ use anyhow::{Result, bail};
 
 use super::choice::Choice;
 use super::knobs::Knob;
-use super::knobs::rungs::{Indirect, Reflection, Refraction, Shadows};
+use super::knobs::rungs::{Indirect, Lights, Reflection, Refraction, Shadows};
 use super::work::Plan;
 
 /// Optional features of the device that some rungs need.
@@ -27,6 +27,8 @@ impl Plan {
             .then(|| "has no addition within subgroups of compute shaders, by which rays count their work".to_owned());
         for (asked, choice, lacks) in [
             (self.paths.is_some(), Indirect::Path.choice(), &counts),
+            // They send shadow rays on every rung of `shadows` but `off`.
+            (rays.shadows && self.light_samples.have_extent(), Lights::Area1.choice(), &counts),
             (rays.shadows, Shadows::Ray.choice(), &counts),
             (rays.mirrors, Reflection::Ray.choice(), &counts),
             (rays.refraction, Refraction::Ray.choice(), &counts),

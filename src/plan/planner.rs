@@ -61,10 +61,8 @@ impl Plan {
         let paths = planner.paths.then_some(Paths { guided, photons });
         let rays = planner.rays(&transmission, &images, &lights, samples);
         let (bands, disperses) = planner.wavelengths(&transmission);
-        let shadow_maps = lights.shadows
-            && knobs.shadows == Shadows::Map
-            && paths.is_none()
-            && (lights.directional + lights.local > 0 || surroundings.forced == ForcedEffects::All);
+        let from_points = lights.directional + lights.local > 0 && paths.is_none();
+        let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && from_points;
         let stored = if paths.is_some() { Stored::default() } else { Stored::of(knobs) };
         let Planner { surfaces, decisions, .. } = planner;
         Self {
@@ -364,7 +362,7 @@ impl Planner<'_> {
     /// Light sampling. Paths sample all lights, and find emission of any kind; other models sample lights with an extent.
     fn light_samples(&mut self, followed: bool) -> LightSamples {
         let Self { scene, surfaces, decisions, knobs, paths, .. } = self;
-        let lit = surfaces.any(|m| !m.unlit);
+        let lit = surfaces.any(|m| !m.unlit && (*paths || scatters(m) || mirrors(m) || m.clearcoat > 0.0));
         let sends_light = |m: &Material| match *paths {
             true if m.unlit => m.base_color[..3] != [0.0; 3],
             true => m.emissive != [0.0; 3],
@@ -377,14 +375,16 @@ impl Planner<'_> {
             false => Cause::against("no visible surface scatters light"),
         };
         let by_lights = knobs.lights.choice().allows(knobs.lights != rungs::Lights::Points);
-        let emitting = decisions.decide_with(EffectId::EmissiveLights, by_lights, cause);
+        // Outside of path tracing forced samples of no light would change roundings of the loop over lights.
+        let decide = if *paths { Decisions::decide_with } else { Decisions::decide_apart };
+        let emitting = decide(decisions, EffectId::EmissiveLights, by_lights, cause);
         let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
         let cause = match (lit, shaped) {
             (false, _) => Cause::against("no visible surface scatters light"),
             (_, None) => Cause::against("no light has an area"),
             (_, Some(light)) => Cause::of(format!("light \"{}\" has an area", light.name)),
         };
-        let shaped = decisions.decide_with(EffectId::AreaLights, by_lights, cause);
+        let shaped = decide(decisions, EffectId::AreaLights, by_lights, cause);
         let count = bounded(scene, emitting, |light| followed || (shaped && light.extent.is_some()));
         let cause = match followed || emitting || shaped {
             false => Cause::against("no lights are sampled"),

@@ -180,7 +180,10 @@ impl Emitters {
 #[must_use]
 pub fn bounded(scene: &Scene, surfaces: bool, is_among: impl Fn(&Light) -> bool) -> usize {
     let local = |light: &&Light| {
-        light.shines() && is_among(light) && !matches!(light.kind, LightKind::Directional { .. }) && !(light.proxy && surfaces)
+        light.shines()
+            && is_among(light)
+            && !matches!(light.kind, LightKind::Directional { .. })
+            && !(light.proxy && surfaces)
     };
     let triangles = |instance: &Instance| {
         let mesh = &scene.meshes[instance.mesh];

@@ -26,7 +26,7 @@ pub struct EmittersOnDevice {
     pub count: u32,
     /// Texel of the first emitter in the buffer of triangles.
     pub first: u32,
-    /// Texel of the root of the light hierarchy there, if there is one.
+    /// Texel of the root of the light hierarchy from there on, if there is one.
     pub nodes: Option<u32>,
     /// Whether some entries are punctual or analytic area lights.
     pub punctual: bool,
@@ -89,7 +89,7 @@ impl EmittersOnDevice {
             )?,
             count,
             first,
-            nodes: hierarchy.map(|_| first + list.len() as u32),
+            nodes: hierarchy.map(|_| list.len() as u32),
             punctual: any(|source| matches!(source, EmitterSource::Punctual(_))),
             triangles: any(|source| matches!(source, EmitterSource::Triangle { .. })),
             columns: emitters.environment.columns,

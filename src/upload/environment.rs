@@ -312,7 +312,11 @@ pub fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, s
     let directions = transport::sky_directions::sky_directions(sky, plan.occlusion_rays() * plan.samples, seed);
     let directions: Vec<SkyDirection> = directions
         .iter()
-        .map(|at| SkyDirection { direction: at.direction.as_vec3().to_array(), weight: at.weight.map(|w| w as f32) })
+        .map(|at| SkyDirection {
+            direction: at.direction.as_vec3().to_array(),
+            weight: at.weight.map(|w| w as f32),
+            measure: at.measure as f32,
+        })
         .collect();
     Buffer::with_data(device, "sky directions", &directions).map(Some)
 }

@@ -238,6 +238,7 @@ impl RaysOnDevice {
             grid_unit: grid.unit,
             nodes: sentinel as u32,
             interfaces: rays.interfaces,
+            first_emitter: emitters_on_device.first,
             ..bytemuck::Zeroable::zeroed()
         };
         Ok(Self {

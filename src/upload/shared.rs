@@ -107,7 +107,6 @@ impl<'a> OnDevice<'a> {
                 area_emitters: plan.light_samples.shaped && emitters.punctual,
                 emissive_triangles: emitters.triangles,
                 light_hierarchy: emitters.nodes.is_some(),
-                first_emitter: emitters.first,
                 light_nodes: emitters.nodes.unwrap_or(0),
                 light_samples: plan.light_samples.count,
             },

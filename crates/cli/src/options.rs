@@ -117,7 +117,7 @@ pub struct SceneOptions {
     #[arg(long, value_name = "NAME|INDEX", help_heading = heading::SCENE)]
     pub only: Vec<String>,
     /// Environment map, studio or none [default: the built-in studio; as fill light if the file contains lights, and
-    /// not if its emissive surfaces light it with --model global]
+    /// not if its emissive surfaces light it]
     #[arg(long, value_name = "FILE.hdr|FILE.exr|studio|none", help_heading = heading::LIGHT)]
     pub env: Option<String>,
     /// Add a directional light of LUX from AZIMUTH degrees about +Y (0: the front, +Z; 90: +X) and ELEVATION degrees

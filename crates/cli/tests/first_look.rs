@@ -141,8 +141,10 @@ fn what_lights_a_file_follows_from_what_it_contains() {
     assert_eq!(lit(&lamp, "--env none"), (Value::Null, json!(0.0), json!(1)));
     assert_eq!(lit(&lamp, "--background env"), (json!("studio"), json!(1.0), json!(1)));
     let panel = folder(emitting(10.0), &[]);
-    assert_eq!(lit(&panel, ""), (json!("studio"), json!(1.0), json!(0)));
-    assert_eq!(lit(&panel, "--model global"), (Value::Null, json!(0.0), json!(0)));
+    assert_eq!(lit(&panel, "--model local"), (json!("studio"), json!(1.0), json!(0)));
+    for follows in ["", "--model global", "--model local --set lights=area:1"] {
+        assert_eq!(lit(&panel, follows), (Value::Null, json!(0.0), json!(0)), "{follows}");
+    }
     assert_eq!(lit(&panel, "--model global --background env"), (json!("studio"), json!(1.0), json!(0)));
     // Letters that glow as white paper does are no lamp.
     assert_eq!(lit(&folder(emitting(1.0), &[]), "--model global"), (json!("studio"), json!(1.0), json!(0)));

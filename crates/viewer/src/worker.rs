@@ -17,7 +17,7 @@ use etalon::image::meter::Meter;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::{Display, over};
 use etalon::plan::Knobs;
-use etalon::plan::rungs::{Indirect, Reflection, Refraction};
+use etalon::plan::rungs::{Indirect, Lights, Reflection, Refraction};
 use etalon::scene::environment::Environment;
 use etalon::transport::events::{EventTracer, Limits};
 
@@ -567,7 +567,7 @@ fn limits_of(knobs: &Knobs) -> Limits {
     let paths = knobs.indirect == Indirect::Path;
     Limits {
         surfaces: if rays || paths { knobs.interfaces.count() } else { 1 },
-        proxies: !paths,
+        proxies: knobs.lights == Lights::Points,
         roughest: knobs.lobes.roughest(),
         least_share: LEAST_SHARE,
     }

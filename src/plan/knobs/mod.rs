@@ -105,7 +105,7 @@ impl Knobs {
             if let Some((chosen, nearest)) = other.into_iter().flatten().next() {
                 return Err(refused(format!(
                     "{chosen} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
-                     {nearest}, or indirect=ambient"
+                     {nearest}, or indirect=ambient with guiding=off and caustics=off"
                 )));
             }
         } else if guiding != Guiding::Off {

@@ -1,0 +1,155 @@
+//! Light samples outside of path tracing: what lights with an extent send to surfaces, also to those that rays meet.
+//!
+//! Read pbrt (4th ed.), section 13.2 (next event estimation). Truth is the path tracer, whose light sampling is tested
+//! against closed forms (tests/paths.rs), in scenes where light is scattered once.
+
+use etalon::frame::Settings;
+use etalon::image::Picture;
+use etalon::plan::rungs::EffectId;
+use etalon::plan::{EffectState, Knobs, LightSamples, Model};
+use etalon::scene::lobe::DIFFUSE_TRANSMISSION;
+use etalon::scene::{LightKind, Material, Scene};
+use etalon::study::shape::Shape;
+use etalon_testing::gpu::{Gpu, bits, spread};
+use etalon_testing::made::{Made, at, lambert, orthographic};
+use glam::{DAffine3, DVec3};
+
+fn settings(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
+    let mut knobs = Knobs::of(model);
+    let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
+    knobs.set_all(&choices).expect("rungs");
+    Settings { size, knobs, ..Settings::default() }
+}
+
+fn shot(gpu: &Gpu, scene: &Scene, model: Model, choices: &[&str]) -> Picture {
+    gpu.shot(scene, None, settings(model, [16, 16], choices)).1
+}
+
+/// Emits 3, 2, 1 on both sides, and reflects nothing.
+fn glowing() -> Material {
+    Material { emissive: [3.0, 2.0, 1.0], double_sided: true, ..lambert([0.0; 3]) }
+}
+
+fn lying() -> DAffine3 {
+    DAffine3::from_rotation_x(-std::f64::consts::FRAC_PI_2)
+}
+
+/// A floor of one material, a glowing panel that stands at its end, and the eye, which sees the floor at 45° in the
+/// direction of the panel's mirror image.
+fn floor(material: Material) -> Made {
+    let mut made = Made::new("floor");
+    made.add(Shape::panel(4.0, 4.0), material, lying());
+    made.add(Shape::panel(1.0, 1.0), glowing(), at(0.0, 0.6, -0.7));
+    made.camera(DVec3::new(0.0, 2.0, 2.0), DVec3::ZERO, orthographic(0.1));
+    made
+}
+
+/// The same mean as paths, in each channel, within the noise of both and `share`.
+fn agree(gpu: &Gpu, scene: &Scene, what: &str, choices: &[&str], share: f64) {
+    let paths = shot(gpu, scene, Model::Global, &[&["samples=256"], choices].concat());
+    let single = shot(gpu, scene, Model::Recursive, &[&["samples=64"], choices].concat());
+    for channel in 0..3 {
+        let ([wanted, of_paths, _], [mean, error, _]) = (spread(&paths, channel), spread(&single, channel));
+        eprintln!("{what}, {channel}: {mean:.5} ± {error:.5} for {wanted:.5} ± {of_paths:.5}");
+        assert!(wanted > 0.01, "{what}: the scene is dark");
+        assert!((mean - wanted).abs() < 4.0 * error.hypot(of_paths) + share * wanted, "{what}: {mean}, not {wanted}");
+    }
+}
+
+/// Of smooth lobes rays find the light, of rough ones light samples do: neither counts twice, and none is missing.
+#[test]
+fn every_lobe_has_the_light_of_a_surface_once() {
+    let gpu = Gpu::open();
+    let same = ["brdf=ggx", "fresnel=exact"];
+    let metal = |roughness| Material { metallic: 1.0, roughness, ..lambert([0.9, 0.8, 0.7]) };
+    let plastic = |roughness| Material { roughness, specular: 1.0, ..lambert([0.3, 0.2, 0.6]) };
+    for roughness in [0.0, 0.1, 0.2, 0.3, 0.6] {
+        agree(&gpu, &floor(metal(roughness)).0, &format!("metal {roughness}"), &same, 0.01);
+        agree(&gpu, &floor(plastic(roughness)).0, &format!("plastic {roughness}"), &same, 0.015);
+    }
+    for clearcoat_roughness in [0.05, 0.5] {
+        let coated = Material { clearcoat: 1.0, clearcoat_roughness, ..plastic(0.5) };
+        agree(&gpu, &floor(coated).0, &format!("coat {clearcoat_roughness}"), &same, 0.02);
+    }
+}
+
+#[test]
+fn light_comes_through_a_leaf() {
+    let gpu = Gpu::open();
+    let mut made = Made::new("leaf");
+    let mut leaf = Material { double_sided: true, ..lambert([0.5; 3]) };
+    leaf.lobes[DIFFUSE_TRANSMISSION].factors = [0.8, 0.9, 0.5, 0.7];
+    made.add(Shape::panel(2.0, 2.0), leaf, lying());
+    made.add(Shape::panel(1.0, 1.0), glowing(), at(0.3, -0.6, 0.2) * lying());
+    made.camera(DVec3::Y * 2.0, DVec3::ZERO, orthographic(0.1));
+    agree(&gpu, &made.0, "leaf", &[], 0.01);
+}
+
+/// What a mirror shows is lit as well: the eye looks down at a mirror that shows a wall, which the panel lights.
+#[test]
+fn surfaces_that_rays_meet_are_lit() {
+    let gpu = Gpu::open();
+    let metal = Material { metallic: 1.0, roughness: 0.0, double_sided: true, ..lambert([0.9, 0.8, 0.7]) };
+    let mut made = Made::new("mirror");
+    made.add(Shape::panel(1.0, 1.0), glowing(), at(0.0, 0.6, -0.7));
+    made.add(Shape::panel(2.0, 2.0), lambert([0.4, 0.6, 0.8]), at(0.0, 2.0, 3.0) * DAffine3::from_rotation_y(3.1));
+    made.add(Shape::panel(0.6, 0.6), metal, at(0.0, 2.0, 0.0) * DAffine3::from_rotation_x(-0.7));
+    made.camera(DVec3::new(0.0, 5.0, 0.0), DVec3::new(0.0, 2.0, 0.0), orthographic(0.1));
+    agree(&gpu, &made.0, "in a mirror", &[], 0.01);
+}
+
+/// The number of samples and the sampler change the noise and not the mean.
+#[test]
+fn rungs_of_light_sampling_agree() {
+    let gpu = Gpu::open();
+    let mut made = Made::new("panels");
+    made.add(Shape::panel(4.0, 4.0), lambert([0.6; 3]), lying());
+    for i in 0..12 {
+        let turn = DAffine3::from_rotation_y(f64::from(i));
+        made.add(Shape::panel(0.2, 0.1), glowing(), turn * at(0.4, 0.1 + 0.05 * f64::from(i), 0.3));
+    }
+    made.camera(DVec3::Y * 3.0, DVec3::ZERO, orthographic(0.5));
+    let mean = |choices: &[&str]| spread(&shot(&gpu, &made.0, Model::Recursive, choices), 0);
+    let [wanted, ..] = mean(&["samples=256", "lights=area:16", "light-sampler=power"]);
+    let mut noise = Vec::new();
+    for lights in ["lights=area:1", "lights=area:4", "lights=area:16"] {
+        let [found, ..] = mean(&["samples=64", lights]);
+        assert!((found / wanted - 1.0).abs() < 0.01, "{lights}: {found}, not {wanted}");
+        let one = shot(&gpu, &made.0, Model::Recursive, &["samples=1", lights]);
+        let best = shot(&gpu, &made.0, Model::Recursive, &["samples=64", "lights=area:16"]);
+        noise.push(one.rgba.iter().zip(&best.rgba).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum::<f64>());
+    }
+    assert!(noise[0] > 2.0 * noise[1] && noise[1] > 2.0 * noise[2], "{noise:?}");
+}
+
+/// Without a light of an extent nothing is sampled: the same picture to the bit, with the same plan.
+#[test]
+fn a_scene_without_such_lights_pays_nothing() {
+    let gpu = Gpu::open();
+    let mut made = Made::new("lit floor");
+    made.add(Shape::panel(4.0, 4.0), lambert([0.6; 3]), lying());
+    made.light([20.0, 10.0, 5.0], LightKind::Point { position: DVec3::new(0.5, 2.0, 0.3), range: None });
+    made.camera(DVec3::Y * 3.0, DVec3::ZERO, orthographic(1.0));
+    let [area, points] = ["lights=area:4", "lights=points"].map(|lights| {
+        let renderer = gpu.renderer(&made.0, None, settings(Model::Recursive, [16, 16], &[lights]));
+        assert_eq!(renderer.plan().light_samples, LightSamples::default());
+        shot(&gpu, &made.0, Model::Recursive, &[lights])
+    });
+    assert!(bits(&area) == bits(&points));
+}
+
+#[test]
+fn the_plan_says_what_is_sampled() {
+    let gpu = Gpu::open();
+    let scene = floor(lambert([0.5; 3])).0;
+    let state = |choices: &[&str], id: EffectId| {
+        let renderer = gpu.renderer(&scene, None, settings(Model::Recursive, [16, 16], choices));
+        renderer.plan().effects.iter().find(|effect| effect.id == id).map(|effect| effect.state)
+    };
+    assert_eq!(state(&[], EffectId::EmissiveLights), Some(EffectState::Kept));
+    assert_eq!(state(&[], EffectId::AreaLights), Some(EffectState::NotCalledFor));
+    // Two triangles are one panel.
+    assert_eq!(state(&[], EffectId::LightHierarchy), Some(EffectState::NotCalledFor));
+    let points = etalon::plan::rungs::Lights::Points.choice();
+    assert_eq!(state(&["lights=points"], EffectId::EmissiveLights), Some(EffectState::DroppedBy(points)));
+}
