@@ -544,7 +544,11 @@ fn lights_with_an_extent_bring_rays_and_samples() {
     };
     let [without, with] = Case {
         choices: &["lights=area:4"],
-        brings: &[HIERARCHY, &["light.emissive_triangles"]],
+        brings: &[
+            HIERARCHY,
+            &["light.emissive_triangles", "light.emitters", "light.emitter_search_steps", "light.light_samples"],
+            &["light.octants", "light.shadows", "light.stored_triangles"],
+        ],
         environments: [Some(Environment::studio()), Some(Environment::studio())],
         same: false,
         ..Case::new("emissive surfaces as lights", NONE, lit(0.0), lit(2.0))
