@@ -238,8 +238,8 @@ impl Opened {
     /// Factor of the environment, `None` where it does not light the scene, and the reason at the end of a sentence.
     ///
     /// Asked for, by itself or as the background, it lights as it is; a scene built by code says itself. For a file:
-    /// - where the light of emissive surfaces is followed and there is enough of it, the author lit the scene with them,
-    ///   and a studio would drown them;
+    /// - where the light of emissive surfaces is followed and there is enough of it, the author lit the scene with
+    ///   them, and a studio would drown them;
     /// - beside lights it is a fill light ([`FILL`]), as in the glTF Sample Viewer: without it, what the lights do not
     ///   reach is black;
     /// - without lights it is all the light there is. That includes emissive surfaces in models that do not follow

@@ -150,8 +150,8 @@ fn the_plan_has_it_only_with_an_environment() {
     assert!(!without.passes(&camera).expect("passes").iter().any(is_pass));
 }
 
-/// What occludes is lit from where it faces: a floor at the foot of a bright wall, in an environment that is brighter in
-/// front of the wall than above. Truth is path tracing.
+/// What occludes is lit from where it faces: a floor at the foot of a bright wall, in an environment that is brighter
+/// in front of the wall than above. Truth is path tracing.
 #[test]
 fn a_wall_gives_back_the_light_that_it_faces() {
     let gpu = Gpu::open();

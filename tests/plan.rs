@@ -112,7 +112,8 @@ impl Case {
 
     fn check(self) -> [Drawn; 2] {
         let Self { effect, reason, scenes, environments, choices, brings, same } = self;
-        // Ambient occlusion and light samples are cases of their own: their rays would call for what other effects bring.
+        // Ambient occlusion and light samples are cases of their own: their rays would call for what other effects
+        // bring.
         let choices = &[&["indirect=ambient", "lights=points", "light-sampler=power"], choices].concat();
         let [without, with] = [0, 1].map(|i| draw(&scenes[i].0, environments[i].as_ref(), choices));
         assert_eq!(state(&without.plan, effect), ("not needed", reason.to_owned()), "{effect}");

@@ -26,8 +26,8 @@ pub struct Lighting<'a> {
 }
 
 /// The ranges of lights for each dispatch: directional lights and light samples, then local lights, at most
-/// [`LIGHTS_AT_ONCE`] each. The last range of the first kind takes the first one of the second if both are small. Local lights are divided at the same indices
-/// with and without tiled light culling, so the sums are bit-identical.
+/// [`LIGHTS_AT_ONCE`] each. The last range of the first kind takes the first one of the second if both are small.
+/// Local lights are divided at the same indices with and without tiled light culling, so the sums are bit-identical.
 fn parts(directional: u32, local: u32, listed: bool) -> Vec<LightRange> {
     let of =
         |count: u32| (0..count).step_by(LIGHTS_AT_ONCE as usize).map(move |i| [i, (i + LIGHTS_AT_ONCE).min(count)]);

@@ -359,7 +359,8 @@ impl Planner<'_> {
         decisions.decide_with(EffectId::PathTracing, knobs.indirect.choice().allows(*paths), cause)
     }
 
-    /// Light sampling. Paths sample all lights, and find emission of any kind; other models sample lights with an extent.
+    /// Light sampling. Paths sample all lights, and find emission of any kind; other models sample lights with an
+    /// extent.
     fn light_samples(&mut self, followed: bool) -> LightSamples {
         let Self { scene, surfaces, decisions, knobs, paths, .. } = self;
         let lit = surfaces.any(|m| !m.unlit && (*paths || scatters(m) || mirrors(m) || m.clearcoat > 0.0));

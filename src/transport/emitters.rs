@@ -175,8 +175,8 @@ impl Emitters {
     }
 }
 
-/// Number of emitters of a scene that have a place: its lights that `is_among` takes, but for directional ones, and with
-/// `surfaces` its emissive triangles.
+/// Number of emitters of a scene that have a place: its lights that `is_among` takes, but for directional ones, and
+/// with `surfaces` its emissive triangles.
 #[must_use]
 pub fn bounded(scene: &Scene, surfaces: bool, is_among: impl Fn(&Light) -> bool) -> usize {
     let local = |light: &&Light| {

@@ -1,5 +1,5 @@
-//! The light sampling tables on the device (shaders/lib/emitters.glsl and light_sampling.glsl): emitters with their CDF,
-//! light hierarchy, environment CDF.
+//! The light sampling tables on the device (shaders/lib/emitters.glsl and light_sampling.glsl): emitters with their
+//! CDF, light hierarchy, environment CDF.
 //!
 //! [`crate::transport::emitters`] and [`crate::transport::light_hierarchy`] compute them.
 
@@ -17,8 +17,8 @@ use crate::transport::emitters::{EmitterSource, Emitters};
 use crate::transport::light_hierarchy::LightHierarchy;
 
 /// The light sampling tables; dummies without lights. The emitters follow the triangles of the BVH in their buffer:
-/// one [`Emitter`] per light, ordered by the CDF. With a light hierarchy its bin comes before the emitters in it, and its
-/// nodes come last.
+/// one [`Emitter`] per light, ordered by the CDF. With a light hierarchy its bin comes before the emitters in it, and
+/// its nodes come last.
 pub struct EmittersOnDevice {
     /// The environment CDF: marginal over rows, then conditional over columns.
     pub sky: Buffer,

@@ -152,7 +152,8 @@ fn everything_can_be_planned() {
         plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] == state).count()
     };
     assert!(count(&lean, "not needed") > 10);
-    // Bodies that touch are another picture, and so is dispersion; light samples, by a hierarchy or not, have other roundings.
+    // Bodies that touch are another picture, and so is dispersion. Light samples, by a hierarchy or not, have other
+    // roundings.
     assert_eq!(count(&full, "not needed"), 5);
     let reasons = full["effects"].to_string();
     assert!(reasons.contains("asked for, although no visible material uses it"), "{reasons}");
