@@ -63,8 +63,11 @@ fn every_lobe_has_the_light_of_a_surface_once() {
     let same = ["brdf=ggx", "fresnel=exact"];
     let metal = |roughness| Material { metallic: 1.0, roughness, ..lambert([0.9, 0.8, 0.7]) };
     let plastic = |roughness| Material { roughness, specular: 1.0, ..lambert([0.3, 0.2, 0.6]) };
-    for roughness in [0.0, 0.1, 0.2, 0.3, 0.6] {
+    // Rays sample lobes up to a roughness of 0.2.
+    for roughness in [0.0, 0.15, 0.4] {
         agree(&gpu, &floor(metal(roughness)).0, &format!("metal {roughness}"), &same, 0.01);
+    }
+    for roughness in [0.15, 0.4] {
         agree(&gpu, &floor(plastic(roughness)).0, &format!("plastic {roughness}"), &same, 0.015);
     }
     for clearcoat_roughness in [0.05, 0.5] {

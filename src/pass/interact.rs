@@ -18,6 +18,9 @@ use crate::shader::interact;
 /// truncated.
 const SPARE_BRANCHES: u32 = 4;
 
+/// A surface that a ray meets has one light sample for so many of a primary surface (docs/decisions/light-samples.md).
+const SURFACES_PER_SAMPLE: u32 = 4;
+
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
 /// part is added: all rays are traced once more, over the same tiles.
 ///
@@ -43,6 +46,8 @@ pub fn interact<'a>(
     library.lighting.tile_words = 0;
     library.lighting.light_budget = library.loops.loop_budget;
     library.gbuffer.stored_triangles = true;
+    // Many surfaces that rays meet share a pixel.
+    library.emitters.light_samples = library.emitters.light_samples.div_ceil(SURFACES_PER_SAMPLE);
     let constants = interact::Constants {
         library,
         masked_hits: with.masked,

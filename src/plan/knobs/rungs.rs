@@ -414,7 +414,11 @@ impl Indirect {
 
 macro_rules! area_about {
     ($samples:literal) => {
-        concat!("Lights and emissive surfaces have their extent, with ", $samples, " at each surface.")
+        concat!(
+            "Lights and emissive surfaces have their extent, by ",
+            $samples,
+            " at each surface, a quarter where single rays meet it."
+        )
     };
 }
 
