@@ -155,7 +155,8 @@ impl Renderer {
             adds_in_subgroups: device.offers().adds_in_subgroups,
         })?;
         let most = if plan.tiles { MOST_LISTED_LIGHTS } else { MOST_LIGHTS };
-        let (name, lights) = (prepared.scene.name.clone(), prepared.scene.lights.len());
+        let name = prepared.scene.name.clone();
+        let lights = (plan.directional_lights + plan.local_lights) as usize;
         if device.limits_loops() && lights > most {
             bail!("{name}: {lights} lights, a software device lights with at most {most} such");
         }
@@ -374,9 +375,11 @@ impl Renderer {
             drawing.work.add(&self.rays.counted());
             ensure!(
                 drawing.work.lights_cut_off == 0,
-                "lighting what rays meet ({} lights, at {} surfaces) takes longer loops than the driver allows: \
-                 draw with shadows=map, fewer lights, fewer interfaces, or on a device without that limit",
+                "lighting what rays meet ({} lights and {} light samples, at {} surfaces) takes longer loops than the \
+                 driver allows: draw with shadows=map and lights=points, fewer lights, fewer interfaces, or on a device \
+                 without that limit",
                 self.plan.directional_lights + self.plan.local_lights,
+                self.plan.light_samples.count,
                 drawing.work.lights_cut_off
             );
         }

@@ -107,8 +107,7 @@ impl Sources {
         let shine = has(EffectId::PunctualLights) || has(EffectId::AreaLights);
         let kept = self.lights.iter().zip(&plan.lights).filter(|(_, is_kept)| shine && **is_kept);
         let names: Vec<String> = kept.map(|(name, _)| format!("\"{name}\"")).collect();
-        // Paths find emission wherever they end; other models sample it, or only show it.
-        let emissive_surfaces = self.emits && (has(EffectId::PathTracing) || has(EffectId::EmissiveLights));
+        let emissive_surfaces = self.emits && has(EffectId::EmissiveLights);
         let environment = self.environment.filter(|_| has(EffectId::Environment));
         let factor = if environment.is_some() { self.factor } else { 0.0 };
         let mut by = Vec::new();

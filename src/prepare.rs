@@ -206,6 +206,10 @@ impl Prepared {
             Some(_) => Emitters::of(&scene, conditions.sky, emitting),
             None => Emitters::with_extent(&scene, shaped, emitting),
         };
+        // Where every emitter is black there is nothing to sample.
+        if plan.paths.is_none() && emitters.list.is_empty() {
+            plan.light_samples.count = 0;
+        }
         let hierarchy = match plan.rays {
             Some(rays) => Some(Hierarchy::of(&scene, original.tree_of(|| &scene)?, &solids, rays)),
             None => None,

@@ -63,7 +63,7 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
         for at in &directions {
             let cos = n.dot(at.direction).max(0.0);
             let free = cos > 0.0 && world.closest(&Ray::new(origin, at.direction)).is_none();
-            let projected = cos * at.measure;
+            let projected = cos * at.solid_angle;
             hemisphere += projected;
             if !free {
                 shut += projected;

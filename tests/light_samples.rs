@@ -1,6 +1,6 @@
 //! Light samples outside of path tracing: what lights with an extent send to surfaces, also to those that rays meet.
 //!
-//! Read pbrt (4th ed.), section 13.2 (next event estimation). Truth is the path tracer, whose light sampling is tested
+//! Read pbrt (4th ed.), section 13.3 (next event estimation). Truth is the path tracer, whose light sampling is tested
 //! against closed forms (tests/paths.rs), in scenes where light is scattered once.
 
 use etalon::frame::Settings;
@@ -8,10 +8,10 @@ use etalon::image::Picture;
 use etalon::plan::rungs::EffectId;
 use etalon::plan::{EffectState, Knobs, LightSamples, Model};
 use etalon::scene::lobe::DIFFUSE_TRANSMISSION;
-use etalon::scene::{LightKind, Material, Scene};
+use etalon::scene::{Extent, LightKind, Material, Scene};
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, bits, spread};
-use etalon_testing::made::{Made, at, lambert, orthographic};
+use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
 
 fn settings(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
@@ -99,6 +99,71 @@ fn surfaces_that_rays_meet_are_lit() {
     made.add(Shape::panel(0.6, 0.6), metal, at(0.0, 2.0, 0.0) * DAffine3::from_rotation_x(-0.7));
     made.camera(DVec3::new(0.0, 5.0, 0.0), DVec3::new(0.0, 2.0, 0.0), orthographic(0.1));
     agree(&gpu, &made.0, "in a mirror", &[], 0.01);
+}
+
+/// A single-sided surface emits on its front alone, towards light samples and towards rays.
+#[test]
+fn the_back_of_a_single_sided_surface_is_dark() {
+    let gpu = Gpu::open();
+    let one_sided = Material { double_sided: false, ..glowing() };
+    let metal = Material { metallic: 1.0, roughness: 0.0, ..lambert([0.9; 3]) };
+    for (what, material) in [("matt", lambert([0.9; 3])), ("mirror", metal)] {
+        for (turn, is_lit) in [(0.0, true), (std::f64::consts::PI, false)] {
+            let mut made = Made::new("floor");
+            made.add(Shape::panel(4.0, 4.0), material.clone(), lying());
+            made.add(Shape::panel(1.0, 1.0), one_sided.clone(), at(0.0, 0.6, -0.7) * DAffine3::from_rotation_y(turn));
+            made.camera(DVec3::new(0.0, 2.0, 2.0), DVec3::ZERO, orthographic(0.1));
+            for model in [Model::Recursive, Model::Global] {
+                let [mean, ..] = spread(&shot(&gpu, &made.0, model, &["samples=4"]), 0);
+                assert_eq!(mean > 1e-6, is_lit, "{what}, {model:?}, turned by {turn}: {mean}");
+            }
+        }
+    }
+}
+
+/// The picture shows the panel to smooth lobes, so light samples do not.
+#[test]
+fn lobes_in_screen_space_have_the_light_once() {
+    let gpu = Gpu::open();
+    let metal = Material { metallic: 1.0, roughness: 0.1, ..lambert([0.9; 3]) };
+    let mut made = floor(metal);
+    made.0.cameras.clear();
+    made.camera(DVec3::new(0.0, 0.6, 2.5), DVec3::new(0.0, 0.2, 0.0), perspective(40.0));
+    // The lower half of the picture: the floor, with the mirror image of the panel.
+    let floor = |reflection: &str| {
+        let film = shot(&gpu, &made.0, Model::Recursive, &["samples=16", "interfaces=1", reflection]);
+        film.rgba[8 * 16..].iter().map(|pixel| f64::from(pixel[0])).sum::<f64>() / 128.0
+    };
+    let (by_rays, on_screen) = (floor("reflection=ray"), floor("reflection=screen"));
+    eprintln!("{by_rays} by rays, {on_screen} on screen");
+    assert!(by_rays > 0.1 && (on_screen / by_rays - 1.0).abs() < 0.2, "{on_screen}, not {by_rays}");
+}
+
+/// All kinds of lights beside each other, so many that tiles list the point lights.
+#[test]
+fn lights_of_every_kind_light_together() {
+    let gpu = Gpu::open();
+    let mut made = floor(lambert([0.7, 0.5, 0.3]));
+    let right = std::f64::consts::FRAC_PI_2;
+    for i in 0..18 {
+        let position = DVec3::new(0.2 * f64::from(i) - 1.8, 1.0, 0.5);
+        made.light([0.2, 0.1, 0.1], LightKind::Point { position, range: Some(3.0) });
+        if i % 9 == 4 {
+            let direction = DVec3::NEG_Y;
+            made.light([1.0; 3], LightKind::Spot { position, direction, range: None, inner: right, outer: right });
+            made.0.lights.last_mut().expect("a light").extent = Some(Extent::Disk { radius: 0.3 });
+        }
+    }
+    made.light([0.3, 0.4, 0.5], LightKind::Directional { direction: DVec3::new(0.2, -1.0, -0.3).normalize() });
+    let renderer = gpu.renderer(&made.0, None, settings(Model::Recursive, [16, 16], &[]));
+    let plan = renderer.plan();
+    assert_eq!((plan.tiles, plan.directional_lights, plan.local_lights), (true, 1, 18));
+    assert!(plan.light_samples.emitting && plan.light_samples.shaped);
+    drop(renderer);
+    agree(&gpu, &made.0, "all kinds", &[], 0.01);
+    let mean = |shadows: &str| spread(&shot(&gpu, &made.0, Model::Recursive, &["samples=64", shadows]), 0)[0];
+    let (by_rays, by_maps) = (mean("shadows=ray"), mean("shadows=map"));
+    assert!((by_maps / by_rays - 1.0).abs() < 0.01, "{by_maps}, not {by_rays}");
 }
 
 /// The number of samples and the sampler change the noise and not the mean.

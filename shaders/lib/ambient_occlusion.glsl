@@ -31,18 +31,18 @@ vec3 visibility_of_environment(Surface s, vec3 direction, bool wanted) {
 }
 
 struct VisibleIrradiance {
-    vec3 share;      // of the irradiance that arrives
-    vec3 occluded;   // share of the directions that occluders take, by cosine and solid angle
-    vec3 towards;    // sum of these directions
+    vec3 share;              // of the irradiance that arrives
+    vec3 occluded_share;     // of the directions, by cosine and solid angle
+    vec3 occluded_direction; // sum of the occluded directions
 };
 
-// Directions between the triangle's plane and that of the interpolated normal count
-// nowhere: a smooth convex mesh does not occlude itself.
+// Directions between the triangle's plane and that of the interpolated normal count nowhere: a smooth convex mesh does not
+// occlude itself.
 VisibleIrradiance visible_irradiance(Surface s) {
     vec3 seen = vec3(0.0);
     vec3 all = vec3(0.0);
     vec3 occluded = vec3(0.0);
-    vec3 towards = vec3(0.0);
+    vec3 occluded_direction = vec3(0.0);
     float hemisphere = 0.0;
     for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
@@ -51,15 +51,15 @@ VisibleIrradiance visible_irradiance(Surface s) {
         vec3 visible = visibility_of_environment(s, sky.direction, cos_l > 0.0);
         seen += weight * visible;
         all += weight;
-        float projected = cos_l * sky.measure;
+        float projected = cos_l * sky.solid_angle;
         hemisphere += projected;
         occluded += projected * (1.0 - visible);
-        towards += sky.direction * (projected * (1.0 - mean(visible)));
+        occluded_direction += sky.direction * (projected * (1.0 - mean(visible)));
     }
     VisibleIrradiance r;
     r.share = mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
-    r.occluded = occluded / max(hemisphere, 1e-30);
-    r.towards = towards;
+    r.occluded_share = occluded / max(hemisphere, 1e-30);
+    r.occluded_direction = occluded_direction;
     return r;
 }
 
@@ -105,10 +105,10 @@ vec3 occluded_environment_light(Surface s) {
     VisibleIrradiance seen = visible_irradiance(s);
     precise vec3 here = environment_irradiance(s.n) * seen.share;
     // What occludes faces this surface, and is taken to be as open.
-    float size2 = dot(seen.towards, seen.towards);
-    precise vec3 there = environment_irradiance(size2 > 0.0 ? -seen.towards * inversesqrt(size2) : s.n) * (1.0 - seen.occluded);
+    float size2 = dot(seen.occluded_direction, seen.occluded_direction);
+    precise vec3 there = environment_irradiance(size2 > 0.0 ? -seen.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - seen.occluded_share);
     precise vec3 kept = min(all, 0.98);
-    precise vec3 given_back = kept * seen.occluded;
+    precise vec3 given_back = kept * seen.occluded_share;
     vec3 irradiance = exchanged_irradiance(here, there, given_back);
     // The radiance of what occludes.
     precise vec3 beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;

@@ -1,7 +1,7 @@
 // Direct lighting of a surface: emission, lights with shadows, and the environment (ambient and split sum).
 // Punctual lights are taken one by one; tiled light culling limits them to those of the pixel's tile (pass/tiles.comp).
 // Emissive surfaces and lights with an area are sampled (next event estimation). Where to read: RTR 4, sections 9.8, 10.5
-// and 20.3; pbrt 4, section 13.2. Assumes: world axes, positions relative to the eye, metres.
+// and 20.3; pbrt 4, section 13.3. Assumes: world axes, positions relative to the eye, metres.
 #ifndef LIGHTING_GLSL
 #define LIGHTING_GLSL
 #include "lib/emitters.glsl"
@@ -26,9 +26,14 @@ bool sends_shadow_rays() {
 // tails of lobes on polished surfaces: a grey surface reflects ten thousand times as much.
 const float FAINTEST_LOBE = 1.0 / 131072.0;
 
-// Event of the random numbers of light samples, before the number of the surface. Those of reflection and refraction, and
-// of ambient occlusion, are smaller.
+// Screen-space reflection adds what the picture shows to the smooth lobes of the surfaces in sight.
+layout(constant) const bool SCREEN_MIRRORS = false;
+
+// Event of the random numbers of light samples, before the number of the surface: 0 the primary surface, then those that the
+// pixel's rays meet, and from FIRST_FRAGMENT on the transparent fragments. Events of base reflection and of ambient
+// occlusion are smaller, those of coats larger.
 const uint LIGHT_EVENT = 0x800u;
+const uint FIRST_FRAGMENT = 0x1000u;
 
 // A light sample by next event estimation: one of LIGHT_SAMPLES for each sample of a pixel. `to_light` begins where the
 // shadow ray does.
@@ -38,15 +43,17 @@ LightSample light_sample(Surface s, uvec2 pixel, uint surface, uint i) {
     return sample_emitter(origin, choose_emitter(origin, words.x), words.y);
 }
 
-// The layers without the lobes of which rays find the light: such a ray meets emissive surfaces itself.
-Layers without_traced_lobes(Layers b) {
-    if (b.s.base_traced) {
+// The layers without the lobes that find emissive surfaces themselves, by a ray or in the picture.
+Layers without_mirrors(Layers b, uint surface) {
+    bool on_screen = SCREEN_MIRRORS && (surface == 0 || surface == FIRST_FRAGMENT);
+    bool is_round = !ANISOTROPY || !is_anisotropic(b.s);
+    if (b.s.base_traced || (on_screen && is_round && b.s.roughness <= ROUGHEST_MIRROR)) {
         b.s.f0 = vec3(0.0);
         b.s.compensation = vec3(0.0);
     }
-    if (CLEARCOAT && b.s.coat_traced) {
+    if (CLEARCOAT && (b.s.coat_traced || (on_screen && b.s.clearcoat_roughness <= ROUGHEST_MIRROR))) {
         b.coat_delta = true;
-        b.under = under_coat(b.s);
+        b.under = BRDF == BRDF_GGX_MULTI ? b.under : under_coat(b.s);
     }
     return b;
 }
@@ -58,8 +65,13 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     if (LIGHT_SAMPLES > 0) {
         if (is_sample) {
             LightSample drawn = light_sample(s, pixel, surface, index);
-            light = PunctualLight(drawn.to_light, normalize(drawn.to_light), drawn.arriving / float(LIGHT_SAMPLES), false);
-            if (EMISSIVE_TRIANGLES && drawn.pdf > 0.0) b = without_traced_lobes(b);
+            // Selected, not multiplied by 0: a sample without light may have no direction.
+            bool lights = largest(drawn.arriving) > 0.0;
+            light.to_light = lights ? drawn.to_light : s.n;
+            light.l = lights ? normalize(drawn.to_light) : s.n;
+            light.arriving = lights ? drawn.arriving / float(LIGHT_SAMPLES) : vec3(0.0);
+            light.directional = false;
+            if (EMISSIVE_TRIANGLES && drawn.pdf > 0.0) b = without_mirrors(b, surface);
         }
     }
     vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
@@ -88,8 +100,8 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     return result;
 }
 
-// The lights of one dispatch: numbers of directional lights, then of light samples, then of point and spot lights; and words
-// of the tiles' bit masks.
+// The lights of one dispatch: indices in the order directional lights, light samples, point and spot lights; and words of
+// the tiles' bit masks.
 struct LightRange {
     uint first;
     uint end;
@@ -100,8 +112,11 @@ struct LightRange {
 // Loop iterations after which no further light is started.
 layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 
-// `surface` is the number of the surface along the pixel's rays, for the random numbers.
-vec3 light_of_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
+// Light samples that no iteration was left for, where no other light is missing.
+uint samples_cut_off = 0;
+
+// `surface` is the number of the surface, for the random numbers.
+vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
     if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
     // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
@@ -119,11 +134,13 @@ vec3 light_of_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, Lig
             }
         }
         bool out_of_steps = loop_iterations > LIGHT_BUDGET && !(listed && bits == 0);
-        lights_cut_off += out_of_steps ? 1u : 0u;
+        bool only_samples = LOCAL_LIGHTS + TILE_WORDS == 0 && next >= DIRECTIONAL_LIGHTS;
+        lights_cut_off += out_of_steps && !only_samples ? 1u : 0u;
+        samples_cut_off += out_of_steps && only_samples ? 1u : 0u;
         if (out_of_steps || (listed && bits == 0)) break;
         bool is_sample = !listed && next >= DIRECTIONAL_LIGHTS && next < DIRECTIONAL_LIGHTS + LIGHT_SAMPLES;
-        uint numbered = is_sample ? next - DIRECTIONAL_LIGHTS : next < DIRECTIONAL_LIGHTS ? next : next - LIGHT_SAMPLES;
-        uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : numbered;
+        uint in_group = is_sample ? next - DIRECTIONAL_LIGHTS : next < DIRECTIONAL_LIGHTS ? next : next - LIGHT_SAMPLES;
+        uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : in_group;
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;
         sum += light_on(b, index, is_sample, uvec2(pixel), surface);
@@ -134,7 +151,7 @@ vec3 light_of_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, Lig
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
 // environment.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, LightRange range, bool all_around) {
-    vec3 result = light_of_lights(layers_of(s), pixel, surface, tiles_across, range);
+    vec3 result = radiance_from_lights(layers_of(s), pixel, surface, tiles_across, range);
     vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
     if (AMBIENT || REFLECTION) around += environment_light(s);
     result += all_around ? around : vec3(0.0);

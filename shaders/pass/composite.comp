@@ -52,7 +52,7 @@ void main() {
     uvec3 last = uvec3(0xffffffffu);
     LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS, 0, TILE_WORDS);
     vec2 shift = vec2(0.0); // offset in pixels of the refracted background
-    uint surface = 0;
+    uint surface = FIRST_FRAGMENT;
     float entry = 0.0;      // depth of the nearest transparent solid
     uint per_fragment = 0; // loop iterations of the last fragment: its neighbours in the list see the same lights
     while (true) {
@@ -116,7 +116,7 @@ void main() {
         compensate(s);
         vec3 shown = radiance_to_eye(s, pixel, surface, tiles_across, all, true);
         // Screen-space reflection for the nearest fragment alone: a ray may march as many steps as the picture is wide.
-        if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, surface == 0));
+        if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, surface == FIRST_FRAGMENT));
         surface++;
         // 6. Composite front to back.
         sum += through * alpha * shown;
@@ -133,5 +133,6 @@ void main() {
     }
     float coverage = 1.0 - (through.r + through.g + through.b) * (1.0 / 3.0) * (1.0 - behind.a);
     imageStore(radiance, pixel, vec4((BEHIND_ALONE ? vec3(0.0) : sum) + through * behind.rgb, coverage));
+    lights_cut_off += samples_cut_off;
     if (sends_shadow_rays() && !BEHIND_ALONE) count_rays(0, 0, 0.0, 0.0);
 }

@@ -270,6 +270,8 @@ void main() {
                 if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.medium_in));
                 compensate(s);
                 keep_diffuse(s, 1.0 - hit.transmits);
+                // Single-sided surfaces emit on their front alone, as for light samples.
+                if (!hit.front && (hit_material(found.triangle) & ONE_SIDED_TRIANGLE) != 0) s.emissive = vec3(0.0);
                 // Light traced by a ray is not looked up as well.
                 s.base_traced = mirrored_by_ray(hit, boundary);
                 LightRange all = LightRange(0, DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS, 0, 0);
@@ -278,6 +280,9 @@ void main() {
                 uint surface = reflection_rays + refraction_rays;
                 split(hit, boundary, ray, cone, uvec2(pixel));
                 if (lit) sum += weight * radiance_to_eye(s, pixel, surface, 0, all, true);
+                // Without its light samples the surface is too dark.
+                lost += samples_cut_off > 0 ? largest(ray.throughput) : 0.0;
+                samples_cut_off = 0;
             } else {
                 bool direct = (ray.events & 0x200u) != 0;
                 bool clear = direct && !SKY;

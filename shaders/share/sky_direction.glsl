@@ -4,6 +4,6 @@
 struct SkyDirection {
     vec3 direction; // world axes
     vec3 weight;    // radiance over the density of the direction
-    float measure;  // 1 over that density
+    float solid_angle; // 1 over that density
 };
 #endif

@@ -18,8 +18,8 @@ use crate::shader::interact;
 /// truncated.
 const SPARE_BRANCHES: u32 = 4;
 
-/// A surface that a ray meets has one light sample for so many of a primary surface (docs/decisions/light-samples.md).
-const SURFACES_PER_SAMPLE: u32 = 4;
+/// Light samples of a primary surface for each of a surface that a ray meets (docs/decisions/light-samples.md).
+const FEWER_AT_HITS: u32 = 4;
 
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
 /// part is added: all rays are traced once more, over the same tiles.
@@ -47,7 +47,7 @@ pub fn interact<'a>(
     library.lighting.light_budget = library.loops.loop_budget;
     library.gbuffer.stored_triangles = true;
     // Many surfaces that rays meet share a pixel.
-    library.emitters.light_samples = library.emitters.light_samples.div_ceil(SURFACES_PER_SAMPLE);
+    library.emitters.light_samples = library.emitters.light_samples.div_ceil(FEWER_AT_HITS);
     let constants = interact::Constants {
         library,
         masked_hits: with.masked,

@@ -23,7 +23,7 @@ pub fn light<'a>(
 ) -> Result<()> {
     let mut library = lighting.library;
     // Without shadow rays, and with the eye outside of closed meshes, the pass sends no ray: one pipeline for all
-    // plans.
+    // plans. Light samples read triangles and their textures, also without shadow rays.
     if !(lighting.shadow_rays() || library.primary.in_medium || lighting.plan.light_samples.count > 0) {
         library.trace = lib::trace::Constants::default();
         library.hit = lib::hit::Constants::default();
@@ -34,6 +34,7 @@ pub fn light<'a>(
         // The pass of ambient occlusion adds the environment's light.
         library.environment_light = lib::environment_light::Constants::default();
     }
+    library.lighting.screen_mirrors = lighting.plan.screen.mirrors;
     let constants = light::Constants { library };
     let bind = light::Bind {
         gbuffer: gbuffer.bind(),

@@ -76,7 +76,10 @@ impl ShadowMaps {
             let depth = Image::nothing(device, vk::Format::D32_SFLOAT, usage)?;
             return Ok(Self { depth, times: Vec::new() });
         };
-        let lights = scene.lights_in_order();
+        // Those after them are sampled, with shadow rays.
+        let from_points = (plan.directional_lights + plan.local_lights) as usize;
+        let all = scene.lights_in_order();
+        let lights = &all[..from_points];
         let cubes = lights.iter().filter(|light| cone(light, bounds).is_none()).count();
         let Some([flat, cube]) = sides(lights.len() - cubes, cubes) else {
             bail!(
@@ -104,13 +107,14 @@ impl ShadowMaps {
                 }
             }
         }
-        let maps_at = lights.len() * LIGHT_TEXELS as usize;
+        let maps_at = all.len() * LIGHT_TEXELS as usize;
         let of_light = |(light, (first, infinite_far)): (&Light, (usize, bool))| LightMaps {
             first: maps_at + first * FACE_TEXELS,
             count: if cone(light, bounds).is_some() { 1 } else { 6 },
             infinite_far,
         };
-        let of_lights = lights.iter().zip(first.into_iter().zip(infinite)).map(of_light).collect();
+        let mut of_lights: Vec<LightMaps> = lights.iter().zip(first.into_iter().zip(infinite)).map(of_light).collect();
+        of_lights.resize(all.len(), LightMaps::default());
         let table: Vec<[f32; 4]> = faces.iter().flat_map(Face::texels).collect();
         let extent = |axis: usize| faces.iter().map(|f| f.square[axis] + f.square[2]).max().unwrap_or(1);
         let depth = image(extent(0), extent(1))?;

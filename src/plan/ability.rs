@@ -3,8 +3,9 @@
 use anyhow::{Result, bail};
 
 use super::choice::Choice;
+use super::effect::EffectState;
 use super::knobs::Knob;
-use super::knobs::rungs::{Indirect, Lights, Reflection, Refraction, Shadows};
+use super::knobs::rungs::{EffectId, Indirect, Lights, Reflection, Refraction, Shadows};
 use super::work::Plan;
 
 /// Optional features of the device that some rungs need.
@@ -25,10 +26,18 @@ impl Plan {
         let rays = self.rays.unwrap_or_default();
         let counts = (!ability.adds_in_subgroups)
             .then(|| "has no addition within subgroups of compute shaders, by which rays count their work".to_owned());
+        // Light samples send shadow rays on every rung of `shadows` but `off`.
+        let sampled = self.effects.iter().find(|effect| {
+            [EffectId::EmissiveLights, EffectId::AreaLights].contains(&effect.id) && effect.state == EffectState::Kept
+        });
+        if let (true, None, Some(lacks), Some(choice)) =
+            (rays.shadows, self.paths, &counts, sampled.and_then(|effect| effect.choice))
+        {
+            let nearest = Lights::Points.choice();
+            bail!("{choice}: the device \"{}\" {lacks}; the nearest choice is {nearest}", ability.device);
+        }
         for (asked, choice, lacks) in [
             (self.paths.is_some(), Indirect::Path.choice(), &counts),
-            // They send shadow rays on every rung of `shadows` but `off`.
-            (rays.shadows && self.light_samples.have_extent(), Lights::Area1.choice(), &counts),
             (rays.shadows, Shadows::Ray.choice(), &counts),
             (rays.mirrors, Reflection::Ray.choice(), &counts),
             (rays.refraction, Refraction::Ray.choice(), &counts),

@@ -369,11 +369,13 @@ impl Planner<'_> {
             true => m.emissive != [0.0; 3],
             false => is_emitter(m),
         };
+        let unsampled = !*paths && surfaces.any(|m| m.emissive != [0.0; 3]) && !surfaces.any(is_emitter);
         let cause = match lit {
+            _ if unsampled => Cause::against("what emits light is transparent or coated, and is not sampled"),
             true => surfaces.cause(sends_light, |m| {
                 if m.unlit { "is unlit and emits its base colour" } else { "emits light" }.to_owned()
             }),
-            false => Cause::against("no visible surface scatters light"),
+            false => Cause::against("no visible surface scatters or reflects light"),
         };
         let by_lights = knobs.lights.choice().allows(knobs.lights != rungs::Lights::Points);
         // Outside of path tracing forced samples of no light would change roundings of the loop over lights.
@@ -381,7 +383,7 @@ impl Planner<'_> {
         let emitting = decide(decisions, EffectId::EmissiveLights, by_lights, cause);
         let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
         let cause = match (lit, shaped) {
-            (false, _) => Cause::against("no visible surface scatters light"),
+            (false, _) => Cause::against("no visible surface scatters or reflects light"),
             (_, None) => Cause::against("no light has an area"),
             (_, Some(light)) => Cause::of(format!("light \"{}\" has an area", light.name)),
         };

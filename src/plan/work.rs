@@ -45,7 +45,7 @@ pub struct Plan {
     pub lights: Vec<bool>,
     /// Number of kept directional lights.
     pub directional_lights: u32,
-    /// Number of kept point and spot lights.
+    /// Number of kept point and spot lights that are not sampled.
     pub local_lights: u32,
     /// Tiled light culling.
     pub tiles: bool,
@@ -58,7 +58,7 @@ pub struct Plan {
     pub rays: Option<Rays>,
     /// Lights that are sampled: those with an extent in every model, and all of them in path tracing.
     pub light_samples: LightSamples,
-    /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from punctual lights,
+    /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from lights,
     /// and recursive rays from smooth surfaces.
     pub paths: Option<Paths>,
     /// Screen-space reflection and refraction.
@@ -152,7 +152,7 @@ pub struct LightSamples {
     pub shaped: bool,
     /// Lights are sampled by a light hierarchy.
     pub hierarchy: bool,
-    /// Light samples of each surface, for each sample of a pixel.
+    /// Light samples of each surface, for each sample of a pixel; 0 where nothing is sampled.
     pub count: u32,
 }
 

@@ -332,8 +332,8 @@ impl EnvironmentCdf {
         probability * (rows * columns) as f64 / (2.0 * PI * PI * sin)
     }
 
-    /// Samples a world-space direction with two random words: `sample_environment` of shaders/lib/emitters.glsl without
-    /// the jitter within a cell.
+    /// Samples a world-space direction with two random words: `sample_environment` of shaders/lib/light_sampling.glsl
+    /// without the jitter within a cell.
     #[must_use]
     pub fn direction(&self, words: [u32; 2]) -> DVec3 {
         let ([column, row], _) = self.cell(words.map(|word| f64::from(word) / ALL));

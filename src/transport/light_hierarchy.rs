@@ -1,4 +1,4 @@
-//! The light hierarchy: a binary tree over the emitters that have a place, from which path tracing chooses one by its
+//! The light hierarchy: a binary tree over the emitters that have a place, from which light sampling chooses one by its
 //! importance at the shaded point.
 //!
 //! Read Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting"; pbrt (4th

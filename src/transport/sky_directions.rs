@@ -18,7 +18,7 @@ pub struct SkyDirection {
     /// Radiance of the map over the density of the direction, in W/m².
     pub weight: [f64; 3],
     /// 1 over the density of the direction, in sr.
-    pub measure: f64,
+    pub solid_angle: f64,
 }
 
 /// Point `index` of the R₂ sequence, shifted (Roberts 2018): the plastic number's generalisation of the golden ratio.
@@ -45,7 +45,7 @@ pub fn sky_directions(sky: Sky<'_>, count: u32, seed: u32) -> Vec<SkyDirection> 
         // The density of a direction is the mean of both parts' densities.
         let density = 0.5 * (cdf.density(direction) + 1.0 / (4.0 * PI));
         let weight = sky.map.sample(direction).map(|radiance| radiance / density);
-        SkyDirection { direction: world_from_map * direction, weight, measure: density.recip() }
+        SkyDirection { direction: world_from_map * direction, weight, solid_angle: density.recip() }
     };
     (0..count).map(direction).collect()
 }
@@ -83,7 +83,7 @@ mod tests {
         let map = Environment::studio();
         let at = |rotation| sky_directions(Sky { map: &map, intensity: 1.0, rotation }, 16, 3);
         for (a, b) in at(0.0).iter().zip(at(90.0)) {
-            assert_eq!((a.weight, a.measure), (b.weight, b.measure));
+            assert_eq!((a.weight, a.solid_angle), (b.weight, b.solid_angle));
             assert!((DMat3::from_rotation_y(PI / 2.0) * a.direction).distance(b.direction) < 1e-12);
         }
     }

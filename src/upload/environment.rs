@@ -315,7 +315,7 @@ pub fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, s
         .map(|at| SkyDirection {
             direction: at.direction.as_vec3().to_array(),
             weight: at.weight.map(|w| w as f32),
-            measure: at.measure as f32,
+            solid_angle: at.solid_angle as f32,
         })
         .collect();
     Buffer::with_data(device, "sky directions", &directions).map(Some)

@@ -187,7 +187,7 @@ impl RaysOnDevice {
                 first_triangle[t.instance as usize] + local[t.primitive as usize]
             })
             .collect();
-        let corners = CornerTable::of(scene, solids, rays, plan.paths.is_some());
+        let corners = CornerTable::of(scene, solids, rays, plan.paths.is_some() || plan.light_samples.emitting);
         // The way back from a triangle of the scene to its leaf; dropped triangles have none.
         let mut leaf_places = vec![u32::MAX; scene.triangles()];
         for (place, t) in bvh.triangles.iter().enumerate() {

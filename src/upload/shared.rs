@@ -147,6 +147,7 @@ impl<'a> OnDevice<'a> {
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },
                 tile_words,
                 light_budget: u32::MAX,
+                screen_mirrors: false,
             },
             loops: match scene.device().limits_loops() {
                 true => lib::loops::Constants::default(),

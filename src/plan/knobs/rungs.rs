@@ -45,7 +45,7 @@ effects! {
     PunctualLights = "punctual lights":
         "a light that shines and reaches a surface that it lights" => "the light table; code",
     Shadows = "shadows":
-        "the same lights" => "by rays: the BVH, code; by maps: depth images, passes",
+        "the same lights, and light samples" => "by rays: the BVH, code; by maps: depth images, passes",
     TiledLightCulling = "tiled light culling":
         "16 point and spot lights, one of them with a range" => "two passes and a bit mask for each 16x16 tile",
     PathTracing = "path tracing":
@@ -138,7 +138,7 @@ pub struct Knob {
 pub enum Model {
     /// Direct light with shadow maps; the environment as ambient light and reflection.
     Local,
-    /// Adds ray-traced shadows, ambient occlusion, reflections and refraction.
+    /// Adds ray-traced shadows, emissive surfaces as lights, ambient occlusion, reflections and refraction.
     #[default]
     Recursive,
     /// Path tracing: full indirect light.
@@ -417,7 +417,7 @@ macro_rules! area_about {
         concat!(
             "Lights and emissive surfaces have their extent, by ",
             $samples,
-            " at each surface, a quarter where single rays meet it."
+            " at each surface, fewer where single rays meet it."
         )
     };
 }

@@ -93,7 +93,7 @@ impl StudyBuilder {
         self.scene.lights.push(light);
     }
 
-    /// Adds a proxy light for an emissive surface, for models without emissive triangles as area lights.
+    /// Adds a proxy light for an emissive surface, for pictures with `lights=points`.
     pub(super) fn proxy(&mut self, name: &str, color: [f32; 3], kind: LightKind) {
         self.shine(Light { name: name.to_owned(), color, spectrum: None, extent: None, kind, proxy: true });
     }
