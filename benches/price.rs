@@ -37,7 +37,7 @@ const EFFECTS: &[(&str, &str, &[&str])] = &[
     ("light from all around", "AMBIENT,REFLECTION", &["study:cornell", "--env", "none"]),
     ("spectral rendering", "SPECTRAL", &["study:metals"]),
     ("rough transmission", "ROUGH_TRANSMISSION", &["study:metals", "--model", "global"]),
-    ("analytic area lights", "SHAPED_EMITTERS", &["study:lamps", "--model", "global"]),
+    ("analytic area lights", "AREA_EMITTERS", &["study:lamps", "--model", "global"]),
     ("path guiding", "PATH_GUIDING", &["study:metals", "--model", "global"]),
     (
         "all of a local model's scene",
