@@ -44,7 +44,7 @@ pub fn composite<'a>(
     let mut library = lighting.library;
     // Transparent surfaces reflect the environment: reflection rays start from the G-buffer only.
     library.surface.mirror_rays = false;
-    library.lighting.screen_mirrors = lighting.plan.screen.transparent_mirrors;
+    library.lighting.screen_mirrors = lighting.plan.screen.transparent_mirrors && lighting.plan.light_samples.emitting;
     // Without shadow rays and samples a light is one loop iteration, and too many lights were refused before.
     if lighting.shadow_rays() || lighting.plan.light_samples.count > 0 {
         library.lighting.light_budget = library.loops.loop_budget;

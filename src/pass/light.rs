@@ -34,7 +34,7 @@ pub fn light<'a>(
         // The pass of ambient occlusion adds the environment's light.
         library.environment_light = lib::environment_light::Constants::default();
     }
-    library.lighting.screen_mirrors = lighting.plan.screen.mirrors;
+    library.lighting.screen_mirrors = lighting.plan.screen.mirrors && lighting.plan.light_samples.emitting;
     let constants = light::Constants { library };
     let bind = light::Bind {
         gbuffer: gbuffer.bind(),
