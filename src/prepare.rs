@@ -197,7 +197,7 @@ impl Prepared {
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
         // Directional lights come first: loops over lights and the light sampling table rely on it.
         // Those that other models than path tracing sample come last, where their loops do not reach.
-        let sampled = |light: &Light| plan.paths.is_none() && plan.light_samples.shaped && light.extent.is_some();
+        let sampled = |light: &Light| plan.paths.is_none() && plan.light_samples.take(light);
         scene.lights.sort_by_key(|light| (!matches!(light.kind, LightKind::Directional { .. }), sampled(light)));
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };

@@ -3,26 +3,18 @@
 //! Read pbrt (4th ed.), section 13.3 (next event estimation). Truth is the path tracer, whose light sampling is tested
 //! against closed forms (tests/paths.rs), in scenes where light is scattered once.
 
-use etalon::frame::Settings;
 use etalon::image::Picture;
 use etalon::plan::rungs::EffectId;
-use etalon::plan::{EffectState, Knobs, LightSamples, Model};
+use etalon::plan::{EffectState, LightSamples, Model};
 use etalon::scene::lobe::DIFFUSE_TRANSMISSION;
 use etalon::scene::{Extent, LightKind, Material, Scene};
 use etalon::study::shape::Shape;
-use etalon_testing::gpu::{Gpu, bits, spread};
+use etalon_testing::gpu::{Gpu, bits, settings_of, spread};
 use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
 
-fn settings(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
-    let mut knobs = Knobs::of(model);
-    let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
-    knobs.set_all(&choices).expect("rungs");
-    Settings { size, knobs, ..Settings::default() }
-}
-
 fn shot(gpu: &Gpu, scene: &Scene, model: Model, choices: &[&str]) -> Picture {
-    gpu.shot(scene, None, settings(model, [16, 16], choices)).1
+    gpu.shot(scene, None, settings_of(model, [16, 16], choices)).1
 }
 
 /// Emits 3, 2, 1 on both sides, and reflects nothing.
@@ -155,7 +147,7 @@ fn lights_of_every_kind_light_together() {
         }
     }
     made.light([0.3, 0.4, 0.5], LightKind::Directional { direction: DVec3::new(0.2, -1.0, -0.3).normalize() });
-    let renderer = gpu.renderer(&made.0, None, settings(Model::Recursive, [16, 16], &[]));
+    let renderer = gpu.renderer(&made.0, None, settings_of(Model::Recursive, [16, 16], &[]));
     let plan = renderer.plan();
     assert_eq!((plan.tiles, plan.directional_lights, plan.local_lights), (true, 1, 18));
     assert!(plan.light_samples.emitting && plan.light_samples.shaped);
@@ -199,7 +191,7 @@ fn a_scene_without_such_lights_pays_nothing() {
     made.light([20.0, 10.0, 5.0], LightKind::Point { position: DVec3::new(0.5, 2.0, 0.3), range: None });
     made.camera(DVec3::Y * 3.0, DVec3::ZERO, orthographic(1.0));
     let [area, points] = ["lights=area:4", "lights=points"].map(|lights| {
-        let renderer = gpu.renderer(&made.0, None, settings(Model::Recursive, [16, 16], &[lights]));
+        let renderer = gpu.renderer(&made.0, None, settings_of(Model::Recursive, [16, 16], &[lights]));
         assert_eq!(renderer.plan().light_samples, LightSamples::default());
         shot(&gpu, &made.0, Model::Recursive, &[lights])
     });
@@ -211,7 +203,7 @@ fn the_plan_says_what_is_sampled() {
     let gpu = Gpu::open();
     let scene = floor(lambert([0.5; 3])).0;
     let state = |choices: &[&str], id: EffectId| {
-        let renderer = gpu.renderer(&scene, None, settings(Model::Recursive, [16, 16], choices));
+        let renderer = gpu.renderer(&scene, None, settings_of(Model::Recursive, [16, 16], choices));
         renderer.plan().effects.iter().find(|effect| effect.id == id).map(|effect| effect.state)
     };
     assert_eq!(state(&[], EffectId::EmissiveLights), Some(EffectState::Kept));

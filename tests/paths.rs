@@ -11,7 +11,7 @@ use etalon::study::shape::Shape;
 use etalon::transport::bvh::Bvh;
 use etalon::transport::emitters::{EmitterSource, Emitters, Sky};
 use etalon::transport::photon_guiding::PhotonGuiding;
-use etalon_testing::gpu::{Gpu, bits, spread};
+use etalon_testing::gpu::{Gpu, bits, settings_of, spread};
 use etalon_testing::made::{Made, at, lambert, orthographic, perspective};
 use glam::{DAffine3, DVec3};
 
@@ -21,13 +21,6 @@ fn settings(size: [u32; 2], choices: &[&str]) -> Settings {
 
 /// Next event estimation is the same in every model.
 const MODELS: [Model; 3] = [Model::Local, Model::Recursive, Model::Global];
-
-fn settings_of(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
-    let mut knobs = Knobs::of(model);
-    let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
-    knobs.set_all(&choices).expect("rungs");
-    Settings { size, knobs, ..Settings::default() }
-}
 
 fn draw(gpu: &Gpu, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> Picture {
     gpu.shot(scene, environment, settings).1

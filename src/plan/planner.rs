@@ -300,7 +300,7 @@ impl Planner<'_> {
             |light: &Light| free.iter().any(|kept| std::ptr::eq(*kept, light)) || (useful(light) && (lit || is_forced));
         let kept: Vec<bool> = scene.lights.iter().map(keeps).collect();
         // Paths sample every light; other models sample those with an extent and take the others one by one.
-        let sampled = |light: &Light| !*paths && samples.shaped && light.extent.is_some();
+        let sampled = |light: &Light| !*paths && samples.take(light);
         let count = |test: &dyn Fn(&LightKind) -> bool| {
             let counts = |light: &Light| !sampled(light) && test(&light.kind);
             scene.lights.iter().zip(&kept).filter(|(light, kept)| **kept && counts(light)).count() as u32

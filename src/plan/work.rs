@@ -6,6 +6,7 @@ use super::architecture::Architecture;
 use super::effect::{Effect, EffectState, Evidence, ForcedEffects};
 use super::knobs::Knobs;
 use super::knobs::rungs::{EffectId, Normals, Position, Quadrature};
+use crate::scene::Light;
 
 /// The passes and the shader code that a scene needs under the chosen knobs.
 #[derive(Debug, Clone, PartialEq)]
@@ -161,6 +162,12 @@ impl LightSamples {
     #[must_use]
     pub fn have_extent(&self) -> bool {
         self.emitting || self.shaped
+    }
+
+    /// Whether this light of the scene is sampled outside of path tracing, and not taken one by one.
+    #[must_use]
+    pub fn take(&self, light: &Light) -> bool {
+        self.shaped && light.extent.is_some()
     }
 }
 

@@ -138,6 +138,15 @@ pub fn settings(size: [u32; 2]) -> Settings {
     Settings { size, knobs: knobs(&["samples=1"]), ..Settings::default() }
 }
 
+/// A model with the given rungs.
+#[must_use]
+pub fn settings_of(model: Model, size: [u32; 2], choices: &[&str]) -> Settings {
+    let mut knobs = Knobs::of(model);
+    let choices: Vec<String> = choices.iter().map(|&choice| choice.to_owned()).collect();
+    knobs.set_all(&choices).expect("rungs");
+    Settings { size, knobs, ..Settings::default() }
+}
+
 /// The local model without shadows, and with the given rungs.
 pub fn knobs(choices: &[&str]) -> Knobs {
     let mut knobs = Knobs::of(Model::Local);
