@@ -23,7 +23,8 @@ fn vec(p: [f32; 3]) -> DVec3 {
     Vec3::from(p).as_dvec3()
 }
 
-/// Balls, boxes, a sliver fan and a soup of triangles, far from the origin.
+/// Balls, boxes, a soup of small triangles, and slivers as long as the scene, far from the origin. Rays meet the boxes
+/// of nearly all slivers, so more children wait than a short stack holds.
 fn scene() -> Scene {
     let mut random = Random(7);
     let mut made = Made::new("traversal");
@@ -35,10 +36,13 @@ fn scene() -> Scene {
         made.place(if i % 2 == 0 { ball } else { cube }, DAffine3::from_translation(place) * turn);
     }
     let mut soup = Shape::default();
-    for i in 0..400_u32 {
+    for i in 0..1400_u32 {
         let corner = direction(&mut random) * random.between(0.0, 4.0);
-        for _ in 0..3 {
-            soup.positions.push((corner + direction(&mut random) * 0.3).as_vec3().to_array());
+        let other_end = corner + direction(&mut random) * 8.0;
+        for k in 0..3 {
+            let size = if i < 400 { 0.3 } else { 0.1 };
+            let end = if i >= 400 && k == 0 { other_end } else { corner };
+            soup.positions.push((end + direction(&mut random) * size).as_vec3().to_array());
             soup.normals.push([0.0, 1.0, 0.0]);
             soup.uvs.push([0.0; 2]);
         }

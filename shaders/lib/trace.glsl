@@ -1,8 +1,8 @@
-// BVH traversal: the nearest hit of a ray, or any hit. Stackless with skip pointers, or with a stack.
+// BVH traversal: the nearest hit of a ray, or any hit. Stackless with skip pointers, or with a short stack.
 // Three layouts of one bounding volume hierarchy return the same hits through one interface, `trace`. Stackless traversal
 // follows nodes in depth-first order; a node that is missed points to the next one outside its subtree (a skip pointer).
 // Nodes have 16 bytes (boxes on a grid) or 32 (boxes of floats). The third layout has both children's boxes in the parent
-// and a stack. Triangles are in the order of the leaves in all three.
+// and a short stack. Triangles are in the order of the leaves in all three.
 // Where to read: Smits 1998 (skip pointers); pbrt 4, section 7.3 (BVH); Woop, Benthin and Wald 2013 (watertight
 // intersection); docs/decisions/rays.md. Assumes: bvh space (share/trace.glsl), metres; t in units of the direction's
 // length.
@@ -258,22 +258,77 @@ HitPair traverse_links_pair(TriangleRay ra, vec3 da, float ta, TriangleRay rb, v
 
 // Invocations in a workgroup of every program that traces rays.
 const uint TRACING_LANES = 64;
-// Words of the stacks of a workgroup, as many entries as the BVH is deep; 1 where the traversal has none.
+// Entries of a short stack; a power of two.
+const uint SHORT_STACK = 8;
+// Words of the stacks of a workgroup; 1 where the traversal has none.
 layout(constant) const uint STACK_WORDS = 1;
 // Entry by entry: neighbouring invocations access neighbouring words.
 shared int traversal_stacks[STACK_WORDS];
 
-// Traversal with a stack, the one of GPUs: both children's boxes are in the parent; the nearer child is next, the other
-// goes onto the stack. Inner nodes, then the triangles of one leaf, with branches: an invocation fetches only what it
-// needs. The stack is in shared memory. As an array of the invocation, Mesa's compiler selects among registers or copies
-// the array (docs/decisions/architectures.md).
-// Where to read: Aila and Laine, Understanding the Efficiency of Ray Traversal on GPUs, HPG 2009 ("while-while").
+// The way from the root of the BVH to a node, one bit for each level.
+struct Trail {
+    uint level;    // of the node; the root has 0
+    uvec2 right;   // the way goes to the right child
+    uvec2 waiting; // the other child waits
+    uint stacked;  // waiting children that are on the stack: the deepest ones
+};
+
+uvec2 bit_of_level(uint level) {
+    uint bit = 1u << (level & 31u);
+    return level < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+}
+
+// Word of the topmost entry, or of the next one: a ring, in which the deepest entries replace the oldest.
+uint short_stack_word(Trail trail) {
+    uint waiting = uint(bitCount(trail.waiting.x) + bitCount(trail.waiting.y));
+    return (waiting & (SHORT_STACK - 1u)) * TRACING_LANES + gl_LocalInvocationIndex;
+}
+
+// Goes to a child. The other one waits where it is met too.
+void descend(inout Trail trail, bool right, bool other_waits, int other) {
+    uvec2 bit = bit_of_level(trail.level++);
+    trail.right = right ? trail.right | bit : trail.right & ~bit;
+    if (other_waits) {
+        traversal_stacks[short_stack_word(trail)] = other;
+        trail.waiting |= bit;
+        trail.stacked = min(trail.stacked + 1u, SHORT_STACK);
+    }
+}
+
+// The deepest child that waits, or `end`. One that is no longer on the stack is found from the root, along the trail.
+int ascend(inout Trail trail, int end) {
+    if ((trail.waiting.x | trail.waiting.y) == 0u) return end;
+    uint level = uint(trail.waiting.y != 0u ? 32 + findMSB(trail.waiting.y) : findMSB(trail.waiting.x));
+    uvec2 bit = bit_of_level(level);
+    trail.waiting ^= bit;
+    trail.right ^= bit;
+    trail.level = level + 1u;
+    if (trail.stacked > 0u) {
+        trail.stacked--;
+        return traversal_stacks[short_stack_word(trail)];
+    }
+    int node = 0;
+    for (uint k = 0; k <= level; k++) {
+        node_visits++;
+        StackNode parent = stack_node_at(uint(node));
+        uvec2 right = trail.right & bit_of_level(k);
+        node = (right.x | right.y) != 0u ? parent.right : parent.left;
+    }
+    return node;
+}
+
+// Traversal with a short stack, the one of GPUs: both children's boxes are in the parent; the nearer child is next, the
+// other goes onto the stack. Inner nodes, then the triangles of one leaf, with branches: an invocation fetches only what
+// it needs. The stack is in shared memory. As an array of the invocation, Mesa's compiler selects among registers or copies
+// the array. It is short, because shared memory limits how many subgroups run: what does not fit is found again from the
+// root (docs/decisions/architectures.md).
+// Where to read: Aila and Laine, Understanding the Efficiency of Ray Traversal on GPUs, HPG 2009 ("while-while"); Laine,
+// Restart Trail for Stackless BVH Traversal, HPG 2010.
 Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uint purpose, inout Filters f) {
     BoxRay b = box_ray(r.origin, direction, purpose != NEAREST);
     // A reference is a node or a leaf, as in Traversal; the sentinel ends the traversal.
     b.end = 0x7fffffff;
-    uint bottom = gl_LocalInvocationIndex;
-    uint top = bottom;
+    Trail trail = Trail(0, uvec2(0), uvec2(0), 0);
     Traversal w = Traversal(t_max > 0.0 ? 0 : b.end, 0, Hit(t_max, NO_TRIANGLE, 0.0, 0.0));
     while (w.node != b.end) {
         // 1. Inner nodes: the boxes of both children, until a leaf is met.
@@ -290,32 +345,19 @@ Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uin
             bool hit_r = meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
             float enter_l = max(near_l.x, max(near_l.y, near_l.z));
             float enter_r = max(near_r.x, max(near_r.y, near_r.z));
-            if (hit_l && hit_r) {
-                bool swap = enter_r < enter_l;
-                traversal_stacks[top] = swap ? node.left : node.right;
-                top += TRACING_LANES;
-                w.node = swap ? node.right : node.left;
-            } else if (hit_l || hit_r) {
-                w.node = hit_l ? node.left : node.right;
+            if (hit_l || hit_r) {
+                bool right = hit_r && (!hit_l || enter_r < enter_l);
+                descend(trail, right, hit_l && hit_r, right ? node.left : node.right);
+                w.node = right ? node.right : node.left;
             } else {
-                w.node = b.end;
-                if (top != bottom) {
-                    top -= TRACING_LANES;
-                    w.node = traversal_stacks[top];
-                }
+                w.node = ascend(trail, b.end);
             }
         }
         // 2. The triangles of the leaf. A hit may end the traversal.
         if (w.node < 0) {
             w.leaf = w.node;
             while (w.leaf != 0) test_triangle(w, f, r, b, classes, purpose);
-            if (w.node != b.end) {
-                w.node = b.end;
-                if (top != bottom) {
-                    top -= TRACING_LANES;
-                    w.node = traversal_stacks[top];
-                }
-            }
+            if (w.node != b.end) w.node = ascend(trail, b.end);
         }
     }
     return w.hit;

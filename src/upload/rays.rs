@@ -25,7 +25,7 @@ use crate::prepare::{Hierarchy, Prepared, ray_offset};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene, Shared};
 use crate::shader::lib;
-use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, STACK, TRACING_LANES};
+use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, SHORT_STACK, STACK, TRACING_LANES};
 use crate::share::{
     self, BvhTriangle, CornerColors, CornerFrame, CornerTangents, CornerUvs, MATERIAL_OF_TRIANGLE, ONE_SIDED_TRIANGLE,
     SHEET_TRIANGLE, TraceTerms, WorkCounts,
@@ -40,9 +40,8 @@ use crate::transport::photon_map::PhotonEmission;
 /// copies of the BVH.
 const MOST_ORDERED_BYTES: usize = 256 << 20;
 
-/// Levels of the BVH that traversal with a stack follows: with one word per level and invocation, a workgroup's stacks
-/// fill the 16 KiB of shared memory that every Vulkan device has.
-const MOST_STACKED: u32 = 16_384 / 4 / TRACING_LANES;
+/// Levels of the BVH that traversal with a short stack follows: its trail has a bit for each.
+const MOST_STACKED: u32 = 64;
 
 /// The BVH traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -248,7 +247,7 @@ impl RaysOnDevice {
             constants: TraceConstants {
                 traversal: traversal as u32,
                 octants,
-                stack_words: if traversal == Traversal::Stack { bvh.depth.max(1) * TRACING_LANES } else { 1 },
+                stack_words: if traversal == Traversal::Stack { SHORT_STACK * TRACING_LANES } else { 1 },
                 hit: corners.contents,
                 touching,
             },
