@@ -9,6 +9,8 @@ use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
+use etalon::gpu::keep_pipelines_in;
+use etalon::image::file::cache_folder;
 use etalon::plan::Knob;
 use etalon::scene::EXTENSIONS;
 use tracing::Level;
@@ -175,6 +177,12 @@ pub fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
 /// Those of the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (quiet, whole) = (arguments.quiet, arguments.verbose > 0);
+    // A passport measures how long the driver compiles.
+    if !matches!(arguments.command, Command::Passport(_))
+        && let Some(folder) = cache_folder()
+    {
+        keep_pipelines_in(folder.join("pipelines"));
+    }
     match &arguments.command {
         Command::Render(args) => render::run(args, quiet),
         Command::Scenes(args) => lists::scenes(args),

@@ -143,6 +143,44 @@ fn a_lost_device_is_tried_once_more_in_short_submissions() {
     }
 }
 
+/// What the driver has compiled is kept for later processes, and given back to it as it was or not at all.
+#[test]
+fn compiled_pipelines_are_kept_in_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("keeps.json");
+    std::fs::write(&file, r#"{ "keeps_pipelines": true }"#).expect("a file");
+    let masked = Masked::new(folder.path(), &file);
+    let draw = |masked: &Masked<'_>| {
+        let _ = std::fs::remove_file(file.with_extension("cached"));
+        masked.run(&["render", "study:cornell", "--model", "local", "--size", "8x8", "-o", "x.png"]).succeeded();
+        std::fs::read(file.with_extension("cached")).unwrap_or_default()
+    };
+    let kept = || -> Vec<PathBuf> {
+        let files = std::fs::read_dir(folder.path().join("cache/etalon/pipelines")).into_iter().flatten();
+        files.map(|file| file.expect("a file").path()).collect()
+    };
+    assert_eq!(draw(&masked), Vec::<u8>::new(), "there was none");
+    let [own] = kept().try_into().expect("one file");
+    let whole = std::fs::read(&own).expect("the file");
+    assert_eq!(draw(&masked), whole[16..], "all behind the hash");
+    assert_eq!(std::fs::read(&own).expect("the file"), whole);
+    // One that was damaged is not used, and is replaced.
+    for damaged in [whole[..whole.len() / 2].to_vec(), [&whole[..99], &[0], &whole[100..]].concat(), Vec::new()] {
+        std::fs::write(&own, damaged).expect("written");
+        assert_eq!(draw(&masked), Vec::<u8>::new());
+        assert_eq!(std::fs::read(&own).expect("the file"), whole);
+    }
+    // Where no file can be, the picture is drawn all the same.
+    std::fs::remove_file(&own).expect("removed");
+    std::fs::create_dir(&own).expect("a folder");
+    assert_eq!(draw(&masked), Vec::<u8>::new());
+    // A driver that keeps nothing has no file.
+    std::fs::remove_dir(&own).expect("removed");
+    std::fs::write(&file, "{}").expect("a file");
+    assert_eq!(draw(&masked), Vec::<u8>::new());
+    assert_eq!(kept(), Vec::<PathBuf>::new());
+}
+
 #[test]
 fn want_of_device_memory_is_an_error_and_leaves_no_file() {
     let folder = tempfile::tempdir().expect("a folder");

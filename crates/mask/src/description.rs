@@ -1,7 +1,7 @@
 //! Description of a less capable device, and the environment in which a program sees it.
 
 use std::collections::BTreeMap;
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use ash::vk;
@@ -45,6 +45,9 @@ pub struct Description {
     /// New memory is full of ones: NaN as floats, the largest numbers as integers. For devices whose memory the host
     /// sees.
     pub dirty_memory: bool,
+    /// Pipeline caches have content: 1,000 bytes behind the header. What a cache begins with is appended to the file
+    /// `NAME.cached` beside the description.
+    pub keeps_pipelines: bool,
     /// Errors of arithmetic operations.
     pub(crate) inexact: Inexact,
     /// Words in the program's expected refusal. Empty: the program is expected to render.
@@ -102,6 +105,7 @@ impl From<MailedPassport> for Description {
             inexact: Inexact::default(),
             lost_at_submission: None,
             no_memory_from_allocation: None,
+            keeps_pipelines: false,
             refused: Vec::new(),
         }
     }
@@ -136,6 +140,15 @@ impl Description {
     pub(crate) fn loses_its_first_device() -> bool {
         let Some(path) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return false };
         std::fs::File::create_new(path.with_extension("lost")).is_ok()
+    }
+
+    /// Notes the bytes with which a pipeline cache begins.
+    pub(crate) fn note_cached(bytes: &[u8]) {
+        let Some(path) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return };
+        let noted = std::fs::OpenOptions::new().create(true).append(true).open(path.with_extension("cached"));
+        if let Err(error) = noted.and_then(|mut file| file.write_all(bytes)) {
+            eprintln!("the mask: {error}");
+        }
     }
 
     /// Reads the file that the environment variable names.

@@ -337,6 +337,8 @@ struct DeviceBelow {
     map: vk::PFN_vkMapMemory,
     unmap: vk::PFN_vkUnmapMemory,
     shader: vk::PFN_vkCreateShaderModule,
+    create_cache: vk::PFN_vkCreatePipelineCache,
+    cache_data: vk::PFN_vkGetPipelineCacheData,
 }
 
 static DEVICE_BELOW: OnceLock<DeviceBelow> = OnceLock::new();
@@ -393,6 +395,8 @@ unsafe extern "system" fn create_device(
             map: next!(c"vkMapMemory", vk::PFN_vkMapMemory),
             unmap: next!(c"vkUnmapMemory", vk::PFN_vkUnmapMemory),
             shader: next!(c"vkCreateShaderModule", vk::PFN_vkCreateShaderModule),
+            create_cache: next!(c"vkCreatePipelineCache", vk::PFN_vkCreatePipelineCache),
+            cache_data: next!(c"vkGetPipelineCacheData", vk::PFN_vkGetPipelineCacheData),
         });
     }
     vk::Result::SUCCESS
@@ -405,6 +409,8 @@ unsafe extern "system" fn device_proc(device: vk::Device, name: *const c_char) -
         b"vkQueueSubmit2" => ours!(submit as vk::PFN_vkQueueSubmit2),
         b"vkAllocateMemory" => ours!(allocate as vk::PFN_vkAllocateMemory),
         b"vkCreateShaderModule" => ours!(shader as vk::PFN_vkCreateShaderModule),
+        b"vkCreatePipelineCache" => ours!(create_cache as vk::PFN_vkCreatePipelineCache),
+        b"vkGetPipelineCacheData" => ours!(cache_data as vk::PFN_vkGetPipelineCacheData),
         // SAFETY: the function of the next layer.
         _ => unsafe { (device_below().device_proc)(device, name) },
     }
@@ -472,5 +478,56 @@ unsafe extern "system" fn shader(
             }
             None => (device_below().shader)(device, info, allocator, module),
         }
+    }
+}
+
+/// Bytes of the header of a pipeline cache, behind which the content of a described one lies.
+const CACHE_HEADER: usize = 32;
+const CACHE_CONTENT: [u8; 1000] = [0xa5; 1000];
+
+unsafe extern "system" fn create_cache(
+    device: vk::Device,
+    info: *const vk::PipelineCacheCreateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    cache: *mut vk::PipelineCache,
+) -> vk::Result {
+    // SAFETY: the caller's info, with as many bytes as it says.
+    unsafe {
+        let mut info = *info;
+        if below().description.keeps_pipelines && info.initial_data_size > 0 {
+            let bytes = std::slice::from_raw_parts(info.p_initial_data.cast::<u8>(), info.initial_data_size);
+            Description::note_cached(bytes);
+            // The driver below knows nothing of the content.
+            info.initial_data_size = info.initial_data_size.min(CACHE_HEADER);
+        }
+        (device_below().create_cache)(device, &raw const info, allocator, cache)
+    }
+}
+
+unsafe extern "system" fn cache_data(
+    device: vk::Device,
+    cache: vk::PipelineCache,
+    size: *mut usize,
+    to: *mut c_void,
+) -> vk::Result {
+    let next = device_below().cache_data;
+    // SAFETY: callers ask for the size first, then for the data; the caller's room holds as many bytes as it says.
+    unsafe {
+        if !below().description.keeps_pipelines {
+            return next(device, cache, size, to);
+        }
+        let whole = CACHE_HEADER + CACHE_CONTENT.len();
+        if to.is_null() {
+            *size = whole;
+            return vk::Result::SUCCESS;
+        }
+        if *size < whole {
+            return vk::Result::INCOMPLETE;
+        }
+        let mut header = CACHE_HEADER;
+        let answer = next(device, cache, &raw mut header, to);
+        ptr::copy_nonoverlapping(CACHE_CONTENT.as_ptr(), to.cast::<u8>().add(CACHE_HEADER), CACHE_CONTENT.len());
+        *size = whole;
+        answer
     }
 }

@@ -17,6 +17,7 @@ use serde::Serialize;
 use super::cache::Caches;
 use super::choice::DeviceChoice;
 use super::error::NotOpened;
+use super::kept_pipelines::KeptPipelines;
 use super::limits::{COLOR_TARGETS, STORAGE_BUFFERS, STORAGE_BUFFERS_AND_TABLES, STORAGE_IMAGES, UNIFORM_BUFFERS};
 use super::offers::Offers;
 use super::pace::{OF_FRAME, SliceTimes};
@@ -382,6 +383,7 @@ pub struct Device {
     pub(super) executables: Option<khr::pipeline_executable_properties::Device>,
     pub(super) allocator: Mutex<ManuallyDrop<Allocator>>,
     pub(super) caches: Mutex<Caches>,
+    pub(super) kept_pipelines: KeptPipelines,
     pub(super) limits: vk::PhysicalDeviceLimits,
     offers: Offers,
     is_lavapipe: bool,
@@ -487,6 +489,7 @@ impl Device {
                     .with_context(opening)?,
             )
         };
+        let kept_pipelines = KeptPipelines::open(&raw, &properties);
         let device = Arc::new(Self {
             push: offers.push_descriptors.then(|| khr::push_descriptor::Device::new(&instance.raw, &raw)),
             executables: offers
@@ -499,6 +502,7 @@ impl Device {
             timeline,
             allocator: Mutex::new(ManuallyDrop::new(allocator)),
             caches: Mutex::default(),
+            kept_pipelines,
             limits: properties.limits,
             offers,
             is_lavapipe,
@@ -636,6 +640,7 @@ impl Drop for Device {
         unsafe {
             let _ = self.raw.device_wait_idle();
             lock(&self.caches).destroy(&self.raw);
+            self.kept_pipelines.close(&self.raw);
             ManuallyDrop::drop(&mut lock(&self.allocator));
             self.raw.destroy_semaphore(self.timeline, None);
             self.raw.destroy_command_pool(*lock(&self.commands), None);

@@ -19,6 +19,7 @@ mod device;
 mod error;
 mod float_controls;
 mod frame;
+mod kept_pipelines;
 pub mod limits;
 mod loops;
 mod memory;
@@ -50,6 +51,7 @@ pub use device::{Candidate, Created, Device, DeviceInfo, Message, Severity, cand
 pub use error::{NotOpened, TooLarge};
 pub use float_controls::with_float_controls;
 pub use frame::{ColorTarget, DepthTarget, Draw, Frame, PassPlan, PassTime, Raster, VertexStream};
+pub use kept_pipelines::keep_pipelines_in;
 pub use loops::with_loops_counted;
 pub use memory::{Buffer, Image, ImageDesc, NOTHING, Place};
 pub use offers::Offers;

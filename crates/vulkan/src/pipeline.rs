@@ -1,10 +1,11 @@
 //! Pipelines, pipeline layouts and samplers, created once per distinct description.
 //!
 //! Read the Vulkan specification, chapters Pipelines, Resource Descriptors and Samplers. New pipelines are created on
-//! another thread while the frame is recorded.
+//! other threads while the frame is recorded.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use anyhow::{Context as _, Result};
@@ -19,7 +20,10 @@ use super::shader::{Binding, Program, Replacement, SetLayout};
 use super::specialize::specialized;
 use super::tables::with_tables_in_storage;
 
-/// The pipelines of a frame, some of which another thread is still creating.
+/// A plan has some twenty pipelines, and few of them take most of the time.
+const MOST_COMPILING_THREADS: usize = 8;
+
+/// The pipelines of a frame, some of which other threads are still creating.
 pub(super) struct Pipelines<'k> {
     slots: HashMap<&'k PipelineKey, OnceLock<Result<vk::Pipeline, vk::Result>>>,
 }
@@ -130,10 +134,8 @@ impl Device {
         Ok(layout)
     }
 
-    /// Runs `meanwhile` while another thread creates those pipelines of `keys` that do not exist yet, in the order of
-    /// `keys`.
-    ///
-    /// One thread creates pipelines, not several, and under validation none beside the calling thread
+    /// Runs `meanwhile` while other threads create those pipelines of `keys` that do not exist yet, in the order of
+    /// `keys`: one thread on software devices, several on others, and under validation the calling thread
     /// (docs/decisions/specialization.md).
     ///
     /// # Errors
@@ -160,9 +162,18 @@ impl Device {
         let make_all = || {
             let _end = Settled(&pipelines);
             let start = Instant::now();
-            for &key in &missing {
-                let _ = pipelines.slots[key].set(self.make(key));
-            }
+            let next = AtomicUsize::new(0);
+            let make_some = || {
+                while let Some(&key) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let _ = pipelines.slots[key].set(self.make(key));
+                }
+            };
+            std::thread::scope(|scope| {
+                for _ in 1..self.compiling_threads().min(missing.len()) {
+                    scope.spawn(make_some);
+                }
+                make_some();
+            });
             lock(&self.caches).making_ms += start.elapsed().as_secs_f64() * 1e3;
         };
         let result = if self.validates() {
@@ -199,6 +210,14 @@ impl Device {
             unsafe { self.raw.destroy_pipeline(pipeline, None) };
             self.gone();
         }
+    }
+
+    /// Threads that create pipelines at once. lavapipe creates them in the context of its queue, without a lock.
+    fn compiling_threads(&self) -> usize {
+        if self.is_software() || self.validates() {
+            return 1;
+        }
+        std::thread::available_parallelism().map_or(1, |all| all.get().min(MOST_COMPILING_THREADS))
     }
 
     fn make(&self, key: &PipelineKey) -> Result<vk::Pipeline, vk::Result> {
@@ -273,9 +292,16 @@ impl Device {
             if self.time_slices.slice_ms.is_some() {
                 flags |= vk::PipelineCreateFlags::DISPATCH_BASE;
             }
-            let info = vk::ComputePipelineCreateInfo::default().flags(flags).stage(stages[0]).layout(layout);
+            let mut told = vk::PipelineCreationFeedback::default();
+            let mut feedback = vk::PipelineCreationFeedbackCreateInfo::default().pipeline_creation_feedback(&mut told);
+            let info = vk::ComputePipelineCreateInfo::default()
+                .flags(flags)
+                .stage(stages[0])
+                .layout(layout)
+                .push_next(&mut feedback);
             // SAFETY: a valid create info whose pointees outlive the call.
-            let made = unsafe { self.raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+            let made = unsafe { self.raw.create_compute_pipelines(self.kept_pipelines.raw, &[info], None) };
+            self.kept_pipelines.note(told);
             return made.map(|p| p[0]).map_err(|(_, error)| error);
         };
         let formats = [
@@ -337,6 +363,8 @@ impl Device {
         if let Some((format, _)) = raster.depth {
             rendering = rendering.depth_attachment_format(format);
         }
+        let mut told = vk::PipelineCreationFeedback::default();
+        let mut feedback = vk::PipelineCreationFeedbackCreateInfo::default().pipeline_creation_feedback(&mut told);
         let info = vk::GraphicsPipelineCreateInfo::default()
             .flags(self.capture())
             .stages(&stages)
@@ -349,9 +377,11 @@ impl Device {
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
             .layout(layout)
-            .push_next(&mut rendering);
+            .push_next(&mut rendering)
+            .push_next(&mut feedback);
         // SAFETY: a valid create info whose pointees outlive the call.
-        let made = unsafe { self.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = unsafe { self.raw.create_graphics_pipelines(self.kept_pipelines.raw, &[info], None) };
+        self.kept_pipelines.note(told);
         made.map(|p| p[0]).map_err(|(_, error)| error)
     }
 }
