@@ -53,8 +53,10 @@ VisibleIrradiance visible_irradiance(Surface s) {
         all += weight;
         float projected = cos_l * sky.solid_angle;
         hemisphere += projected;
-        occluded += projected * (1.0 - visible);
-        occluded_direction += sky.direction * (projected * (1.0 - mean(visible)));
+        // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
+        vec3 hidden = 1.0 - visible;
+        occluded += projected * hidden;
+        occluded_direction += sky.direction * (projected * mean(hidden));
     }
     VisibleIrradiance r;
     r.share = mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));

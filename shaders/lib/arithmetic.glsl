@@ -359,4 +359,8 @@ vec2 cos_sin_of_turns(float turns) {
     }
     return r;
 }
+
+float cos_of_turns(float turns) {
+    return cos_sin_of_turns(turns).x;
+}
 #endif

@@ -32,9 +32,11 @@ float film_reflectance(float a, float rho, float cos_phi) {
 // Mean of cos(2π path/λ) over the sensitivities of red, green and blue, relative to white. The matching functions are four
 // Gaussians over 1/λ (Belcour and Barla 2017), so the mean has a closed form.
 vec3 film_sensitivity(float path) {
-    float k = 2.0 * PI * path * 1e-9;
-    vec4 waves = cos(vec4(1.6810e6, 1.7953e6, 2.2084e6, 2.2399e6) * k);
-    vec4 gaussians = waves * exp(vec4(-4.3278e9, -9.3046e9, -6.6121e9, -4.5282e9) * (k * k));
+    float micrometres = path * 1e-3;
+    vec4 turns = vec4(1.6810, 1.7953, 2.2084, 2.2399) * micrometres;
+    vec4 waves = vec4(cos_of_turns(turns.x), cos_of_turns(turns.y), cos_of_turns(turns.z), cos_of_turns(turns.w));
+    float k = 2.0 * PI * micrometres;
+    vec4 gaussians = waves * exp(vec4(-4.3278e-3, -9.3046e-3, -6.6121e-3, -4.5282e-3) * (k * k));
     // X has two, weighted by their areas.
     vec3 xyz = vec3(0.846202 * gaussians.x + 0.153798 * gaussians.w, gaussians.yz);
     // Equal X, Y and Z are not white in Rec. 709: each channel is divided by its value for them.
@@ -72,7 +74,7 @@ Film film_at(float cos_in, float n1, float n, float thickness) {
     film.cos_film = sqrt(max(cos2, 0.0));
     film.outer = interface_amplitudes(cos_in, film.cos_film, n1, n);
     float path = 2.0 * n * thickness * film.cos_film;
-    film.cos_phi = SPECTRAL ? vec3(cos(2.0 * PI * fract(path / band_wavelength()))) : film_sensitivity(path);
+    film.cos_phi = SPECTRAL ? vec3(cos_of_turns(path / band_wavelength())) : film_sensitivity(path);
     film.cos_2_phi = film_sensitivity(2.0 * path);
     film.cos_3_phi = film_sensitivity(3.0 * path);
     return film;
