@@ -17,6 +17,7 @@ use etalon::gpu::{Device, Replacement};
 use etalon::plan::{KNOBS, Knobs, Model};
 use etalon::scene::{Camera, Scene};
 use etalon::study;
+use etalon_mask::Mask;
 use etalon_testing::gltf_builder::{Builder, FLOAT, f32s};
 use etalon_testing::gpu::Gpu;
 use etalon_testing::made::Random;
@@ -155,6 +156,30 @@ fn the_window_shows_what_render_draws() {
     let (code, words) = viewer.close();
     assert_eq!(code, Some(0), "{words}");
     assert!(!words.contains("Validation") && !words.contains("panicked"), "{words}");
+}
+
+/// Half of the requests for the window's next picture fail, in every way that is no error: the window shows its
+/// picture.
+#[test]
+fn a_window_outlives_what_befalls_its_swapchain() {
+    let Some(display) = Display::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let file = folder.join("faults.json");
+    let faults = json!({ "acquire": ["", "TIMEOUT", "", "OUT_OF_DATE", "", "SURFACE_LOST"] });
+    std::fs::write(&file, faults.to_string()).expect("a file");
+    let mask = Mask::in_folder(folder).expect("the layer is built");
+    let variables = mask.variables(&file);
+    let variables = variables.each_ref().map(|(name, value)| (*name, value.as_str()));
+    let arguments = ["study:cornell", "--size", "320x180", "--bare"];
+    let mut viewer = Viewer::open_with(&display, folder, &arguments, &variables);
+    shows_its_command(&mut viewer, folder);
+    viewer.resize([300, 211]);
+    viewer.drag(1, [160, 90], [200, 110]);
+    shows_its_command(&mut viewer, folder);
+    let (code, words) = viewer.close();
+    assert_eq!(code, Some(0), "{words}");
+    assert!(!words.contains("panicked"), "{words}");
 }
 
 /// A triangle that goes to the right for two seconds, seen by a camera of the file that goes with it for one.

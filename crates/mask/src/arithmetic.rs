@@ -1,5 +1,5 @@
-//! Arithmetic as inexact as Vulkan allows: SPIR-V in which divisions, roots, exponentials and logarithms are off by a
-//! number of units in the last place.
+//! Arithmetic as inexact as Vulkan allows: SPIR-V in which divisions, roots, exponentials, logarithms and trigonometric
+//! functions are off by a number of units in the last place.
 //!
 //! Read the Vulkan specification, appendix Vulkan Environment for SPIR-V, section Precision and Operation of SPIR-V
 //! Instructions: 2.5 ulp for division, 2 for `inversesqrt`, whose reciprocal is `sqrt`, 3 + 2|x| for `exp2`, 3 for
@@ -8,9 +8,11 @@
 use std::collections::HashSet;
 
 use rspirv::binary::Assemble as _;
-use rspirv::dr::{Builder, Instruction, Operand, load_words};
-use rspirv::spirv::{ExecutionMode, GlslStd450Op, Op, Word};
+use rspirv::dr::{Builder, Instruction, Operand};
+use rspirv::spirv::{GlslStd450Op, Op, Word};
 use serde::Deserialize;
+
+use crate::rewrite::{extended_set, float_size, loaded};
 
 /// Units in the last place that are added to the magnitude of results; negative ones are taken away.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -24,6 +26,9 @@ pub(crate) struct Inexact {
     pub(crate) root: i32,
     /// Of `exp`, `exp2`, `log`, `log2` and `pow`; at most 2.
     pub(crate) power: i32,
+    /// Of the trigonometric functions and their inverses; 4096 is what Vulkan allows arc functions, and half of the
+    /// 2^-11 that it allows sines and cosines near 1.
+    pub(crate) angle: i32,
 }
 
 impl Inexact {
@@ -43,6 +48,15 @@ impl Inexact {
                         | GlslStd450Op::Log2
                         | GlslStd450Op::Pow,
                     ) => self.power,
+                    Some(
+                        GlslStd450Op::Sin
+                        | GlslStd450Op::Cos
+                        | GlslStd450Op::Tan
+                        | GlslStd450Op::Asin
+                        | GlslStd450Op::Acos
+                        | GlslStd450Op::Atan
+                        | GlslStd450Op::Atan2,
+                    ) => self.angle,
                     _ => 0,
                 }
             }
@@ -52,39 +66,16 @@ impl Inexact {
 
     /// The module with inexact results; `None` if it is no module, or has no such result.
     pub(crate) fn rewritten(self, words: &[Word]) -> Option<Vec<Word>> {
-        let (words, modes) = without_modes_by_id(words);
-        let mut builder = Builder::new_from_module(load_words(words).ok()?);
+        let (mut builder, modes) = loaded(words)?;
         let module = builder.module_ref();
-        let imports = &module.ext_inst_imports;
-        let is_glsl =
-            |import: &&Instruction| import.operands.first() == Some(&Operand::LiteralString("GLSL.std.450".to_owned()));
-        let extended = imports.iter().find(is_glsl).and_then(|import| import.result_id);
-        // Sizes of the types of floats: 1 for a scalar.
-        let floats: Vec<Word> = module
-            .types_global_values
-            .iter()
-            .filter(|i| i.class.opcode == Op::TypeFloat && i.operands.first() == Some(&Operand::LiteralBit32(32)))
-            .filter_map(|i| i.result_id)
-            .collect();
-        let size_of = |kind: Word| -> Option<u32> {
-            if floats.contains(&kind) {
-                return Some(1);
-            }
-            let vector = module.types_global_values.iter().find(|i| i.result_id == Some(kind))?;
-            match (vector.class.opcode, vector.operands.as_slice()) {
-                (Op::TypeVector, [Operand::IdRef(of), Operand::LiteralBit32(size)]) if floats.contains(of) => {
-                    Some(*size)
-                }
-                _ => None,
-            }
-        };
+        let extended = extended_set(module);
         let mut found = Vec::new();
         for (f, function) in module.functions.iter().enumerate() {
             for (b, block) in function.blocks.iter().enumerate() {
                 for (i, instruction) in block.instructions.iter().enumerate() {
                     let ulps = self.of(instruction, extended);
                     let (Some(kind), Some(result)) = (instruction.result_type, instruction.result_id) else { continue };
-                    if let (true, Some(size)) = (ulps != 0, size_of(kind)) {
+                    if let (true, Some(size)) = (ulps != 0, float_size(module, kind)) {
                         found.push(([f, b, i], [kind, result], ulps, size));
                     }
                 }
@@ -141,25 +132,4 @@ fn moved_by(builder: &mut Builder, raw: Word, [kind, result]: [Word; 2], ulps: i
         make(Op::IAdd, words, sum, &[bits, by]),
         make(Op::Bitcast, kind, result, &[sum]),
     ]
-}
-
-/// Words of a module without its `OpExecutionModeId` instructions, and these: the loader of rspirv 0.13 refuses them.
-fn without_modes_by_id(words: &[Word]) -> (Vec<Word>, Vec<Instruction>) {
-    const HEADER: usize = 5;
-    let (mut kept, mut modes) = (words[..HEADER.min(words.len())].to_vec(), Vec::new());
-    let mut rest = words.get(HEADER..).unwrap_or_default();
-    while let Some(&first) = rest.first() {
-        let (this, next) = rest.split_at(((first >> 16) as usize).clamp(1, rest.len()));
-        match (first & 0xffff == Op::ExecutionModeId as u32, this) {
-            (true, [_, entry, mode, ids @ ..]) => {
-                let ids = ids.iter().copied().map(Operand::IdRef);
-                let mode = ExecutionMode::from_u32(*mode).map(Operand::ExecutionMode);
-                let operands = std::iter::once(Operand::IdRef(*entry)).chain(mode).chain(ids).collect();
-                modes.push(Instruction::new(Op::ExecutionModeId, None, None, operands));
-            }
-            _ => kept.extend(this),
-        }
-        rest = next;
-    }
-    (kept, modes)
 }

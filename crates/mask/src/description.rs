@@ -8,6 +8,8 @@ use ash::vk;
 use serde::Deserialize;
 
 use crate::arithmetic::Inexact;
+use crate::contraction::contracted;
+use crate::order::reordered;
 
 /// Environment variable with the path of the description file.
 pub(crate) const VARIABLE: &str = "ETALON_MASK";
@@ -45,11 +47,20 @@ pub struct Description {
     /// New memory is full of ones: NaN as floats, the largest numbers as integers. For devices whose memory the host
     /// sees.
     pub dirty_memory: bool,
+    /// Factor of all timestamps: 0 for a clock that stands still, or much for one that runs too fast.
+    pub timestamps_times: Option<u64>,
+    /// What asking for a window's next picture comes to, in turns: `TIMEOUT`, `OUT_OF_DATE`, `SURFACE_LOST`, or nothing
+    /// for the picture.
+    pub acquire: Vec<String>,
     /// Pipeline caches have content: 1,000 bytes behind the header. What a cache begins with is appended to the file
     /// `NAME.cached` beside the description.
     pub keeps_pipelines: bool,
     /// Errors of arithmetic operations.
     pub(crate) inexact: Inexact,
+    /// Products and sums are fused wherever the specification allows it.
+    pub contracts: bool,
+    /// Workgroups run in another order.
+    pub reorders: bool,
     /// Words in the program's expected refusal. Empty: the program is expected to render.
     pub refused: Vec<String>,
 }
@@ -103,8 +114,12 @@ impl From<MailedPassport> for Description {
             without_timestamps: !of.timestamps,
             dirty_memory: false,
             inexact: Inexact::default(),
+            contracts: false,
+            reorders: false,
             lost_at_submission: None,
             no_memory_from_allocation: None,
+            timestamps_times: None,
+            acquire: Vec::new(),
             keeps_pipelines: false,
             refused: Vec::new(),
         }
@@ -140,6 +155,25 @@ impl Description {
     pub(crate) fn loses_its_first_device() -> bool {
         let Some(path) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return false };
         std::fs::File::create_new(path.with_extension("lost")).is_ok()
+    }
+
+    /// The SPIR-V that the driver gets; `None` for the given one.
+    pub(crate) fn rewritten(&self, words: &[u32]) -> Option<Vec<u32>> {
+        let inexact = self.inexact.rewritten(words);
+        let contracted = self.contracts.then(|| contracted(inexact.as_deref().unwrap_or(words))).flatten().or(inexact);
+        let reordered = self.reorders.then(|| reordered(contracted.as_deref().unwrap_or(words))).flatten();
+        reordered.or(contracted)
+    }
+
+    /// What the nth request for a window's picture comes to, in place of the picture.
+    pub(crate) fn acquired(&self, number: u64) -> Option<vk::Result> {
+        let turn = number.checked_rem(self.acquire.len() as u64)?;
+        match self.acquire[turn as usize].as_str() {
+            "TIMEOUT" => Some(vk::Result::TIMEOUT),
+            "OUT_OF_DATE" => Some(vk::Result::ERROR_OUT_OF_DATE_KHR),
+            "SURFACE_LOST" => Some(vk::Result::ERROR_SURFACE_LOST_KHR),
+            _ => None,
+        }
     }
 
     /// Notes the bytes with which a pipeline cache begins.

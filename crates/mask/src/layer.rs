@@ -339,13 +339,17 @@ struct DeviceBelow {
     shader: vk::PFN_vkCreateShaderModule,
     create_cache: vk::PFN_vkCreatePipelineCache,
     cache_data: vk::PFN_vkGetPipelineCacheData,
+    query_results: vk::PFN_vkGetQueryPoolResults,
+    /// Of devices with windows.
+    acquire: Option<vk::PFN_vkAcquireNextImageKHR>,
 }
 
 static DEVICE_BELOW: OnceLock<DeviceBelow> = OnceLock::new();
-/// Submissions and allocations so far. The loader unloads the layer with the last instance.
+/// Submissions, allocations and requests for pictures so far. The loader unloads the layer with the last instance.
 static SUBMISSIONS: AtomicU64 = AtomicU64::new(0);
 static LOST: AtomicBool = AtomicBool::new(false);
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+static ACQUIRED: AtomicU64 = AtomicU64::new(0);
 
 fn device_below() -> &'static DeviceBelow {
     DEVICE_BELOW.get().expect("a device was made")
@@ -375,7 +379,13 @@ unsafe extern "system" fn create_device(
             return vk::Result::ERROR_INITIALIZATION_FAILED;
         };
         let create = std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
-        let answer = create(physical, info, allocator, made);
+        let mut features = (*info).p_enabled_features.as_ref().copied().unwrap_or_default();
+        let mut with_doubles = *info;
+        if below().description.contracts {
+            features.shader_float64 = vk::TRUE;
+            with_doubles.p_enabled_features = &raw const features;
+        }
+        let answer = create(physical, &raw const with_doubles, allocator, made);
         if answer != vk::Result::SUCCESS {
             return answer;
         }
@@ -397,6 +407,9 @@ unsafe extern "system" fn create_device(
             shader: next!(c"vkCreateShaderModule", vk::PFN_vkCreateShaderModule),
             create_cache: next!(c"vkCreatePipelineCache", vk::PFN_vkCreatePipelineCache),
             cache_data: next!(c"vkGetPipelineCacheData", vk::PFN_vkGetPipelineCacheData),
+            query_results: next!(c"vkGetQueryPoolResults", vk::PFN_vkGetQueryPoolResults),
+            acquire: device_proc(*made, c"vkAcquireNextImageKHR".as_ptr())
+                .map(|found| std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkAcquireNextImageKHR>(found)),
         });
     }
     vk::Result::SUCCESS
@@ -409,6 +422,10 @@ unsafe extern "system" fn device_proc(device: vk::Device, name: *const c_char) -
         b"vkQueueSubmit2" => ours!(submit as vk::PFN_vkQueueSubmit2),
         b"vkAllocateMemory" => ours!(allocate as vk::PFN_vkAllocateMemory),
         b"vkCreateShaderModule" => ours!(shader as vk::PFN_vkCreateShaderModule),
+        b"vkGetQueryPoolResults" => ours!(query_results as vk::PFN_vkGetQueryPoolResults),
+        b"vkAcquireNextImageKHR" if device_below().acquire.is_some() => {
+            ours!(acquire as vk::PFN_vkAcquireNextImageKHR)
+        }
         b"vkCreatePipelineCache" => ours!(create_cache as vk::PFN_vkCreatePipelineCache),
         b"vkGetPipelineCacheData" => ours!(cache_data as vk::PFN_vkGetPipelineCacheData),
         // SAFETY: the function of the next layer.
@@ -470,11 +487,10 @@ unsafe extern "system" fn shader(
     // SAFETY: the caller's info, with as many bytes of code as it says; the rewritten code outlives the call.
     unsafe {
         let words = std::slice::from_raw_parts((*info).p_code, (*info).code_size / 4);
-        match below().description.inexact.rewritten(words) {
+        match below().description.rewritten(words) {
             Some(words) => {
-                let inexact =
-                    vk::ShaderModuleCreateInfo { p_code: words.as_ptr(), code_size: 4 * words.len(), ..*info };
-                (device_below().shader)(device, &raw const inexact, allocator, module)
+                let other = vk::ShaderModuleCreateInfo { p_code: words.as_ptr(), code_size: 4 * words.len(), ..*info };
+                (device_below().shader)(device, &raw const other, allocator, module)
             }
             None => (device_below().shader)(device, info, allocator, module),
         }
@@ -529,5 +545,47 @@ unsafe extern "system" fn cache_data(
         ptr::copy_nonoverlapping(CACHE_CONTENT.as_ptr(), to.cast::<u8>().add(CACHE_HEADER), CACHE_CONTENT.len());
         *size = whole;
         answer
+    }
+}
+
+unsafe extern "system" fn query_results(
+    device: vk::Device,
+    pool: vk::QueryPool,
+    first: u32,
+    count: u32,
+    bytes: usize,
+    to: *mut c_void,
+    stride: vk::DeviceSize,
+    flags: vk::QueryResultFlags,
+) -> vk::Result {
+    // SAFETY: the caller's arguments. Its results are timestamps, of 8 bytes as the flags say, each at its stride.
+    unsafe {
+        let answer = (device_below().query_results)(device, pool, first, count, bytes, to, stride, flags);
+        if let (Some(factor), true) =
+            (below().description.timestamps_times, flags.contains(vk::QueryResultFlags::TYPE_64))
+        {
+            for query in 0..count as usize {
+                let ticks = to.cast::<u8>().add(query * stride as usize).cast::<u64>();
+                ticks.write_unaligned(ticks.read_unaligned().wrapping_mul(factor));
+            }
+        }
+        answer
+    }
+}
+
+unsafe extern "system" fn acquire(
+    device: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    timeout: u64,
+    semaphore: vk::Semaphore,
+    fence: vk::Fence,
+    index: *mut u32,
+) -> vk::Result {
+    let number = ACQUIRED.fetch_add(1, Ordering::Relaxed);
+    match (below().description.acquired(number), device_below().acquire) {
+        (Some(fault), _) => fault,
+        // SAFETY: the caller's arguments.
+        (None, Some(next)) => unsafe { next(device, swapchain, timeout, semaphore, fence, index) },
+        (None, None) => vk::Result::ERROR_EXTENSION_NOT_PRESENT,
     }
 }

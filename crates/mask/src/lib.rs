@@ -6,7 +6,10 @@
 #![allow(unsafe_code, reason = "a layer is called by the loader, by pointers")]
 
 mod arithmetic;
+mod contraction;
 mod description;
 mod layer;
+mod order;
+mod rewrite;
 
 pub use description::{Description, Mask};
