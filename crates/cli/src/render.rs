@@ -53,17 +53,18 @@ impl Phases {
 /// # Errors
 /// One sentence with the action, its object and the cause.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
-    if args.sequence.is_sequence() {
-        return sequence::run(args, quiet);
-    }
-    if let Some(part) = args.sequence.shard {
-        return shard::run(args, part, quiet);
-    }
-    match draw(args, quiet) {
+    let drawn = |args: &RenderArgs| match args.sequence.shard {
+        _ if args.sequence.is_sequence() => sequence::run(args, quiet),
+        Some(part) => shard::run(args, part, quiet),
+        None => draw(args, quiet),
+    };
+    match drawn(args) {
         Err(error) if is_lost(&error) => {
-            tracing::warn!("{error:#}; the picture is drawn once more, in short submissions");
+            // Frames whose files are complete are not drawn again.
+            let what = if args.sequence.is_sequence() { "what is missing" } else { "the picture" };
+            tracing::warn!("{error:#}; {what} is drawn once more, in short submissions");
             let device = DeviceOptions { short_submissions: true, ..args.device.clone() };
-            draw(&RenderArgs { device, ..args.clone() }, quiet)
+            drawn(&RenderArgs { device, ..args.clone() })
         }
         drawn => drawn,
     }
