@@ -16,7 +16,7 @@ use etalon::study::shape::Shape;
 use etalon_testing::gltf_builder::{Builder, png};
 use etalon_testing::gpu::{Gpu, largest_difference};
 use etalon_testing::lobe::{DOME, Facet, MODELS, alpha, base, dielectric, dome, metal, model, rgb, schlick, worst};
-use etalon_testing::made::{Made, at, lambert};
+use etalon_testing::made::{Made, at, lambert, orthographic};
 use glam::{Affine2, DAffine3, DVec3};
 use serde_json::json;
 
@@ -105,7 +105,7 @@ fn brushed_materials() -> [Material; 6] {
 
 #[test]
 fn an_anisotropic_lobe_is_that_of_heitz_in_every_model() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     for of in MODELS {
         for (exact, light) in [(false, DVec3::new(0.2, 0.5, 1.0)), (true, DVec3::new(-0.7, 0.3, 0.4))] {
             let (mut scene, facets) = dome(&brushed_materials());
@@ -151,7 +151,7 @@ fn mean(film: &Picture, facet: &Facet, channel: usize) -> (f64, f64) {
 
 #[test]
 fn a_white_brushed_metal_sends_what_its_lobe_keeps_of_uniform_light() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let white = |roughness| Material { base_color: [1.0; 4], ..gold(roughness) };
     let materials = [
         with(ANISOTROPY, [0.7, 0.3, 0.0, 0.0], white(0.4)),
@@ -234,7 +234,7 @@ fn bubbles() -> [Material; 6] {
 
 #[test]
 fn a_film_reflects_as_airy_says_in_every_model() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let l = DVec3::new(0.3, 0.4, 1.0).normalize();
     let (scene, facets) = dome(&bubbles());
     let scene = directional(scene, l);
@@ -254,7 +254,7 @@ fn a_film_reflects_as_airy_says_in_every_model() {
 
 #[test]
 fn a_film_without_thickness_changes_nothing() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let l = DVec3::new(0.3, 0.4, 1.0).normalize();
     let bare = plastic([0.2, 0.3, 0.1], 0.4);
     let flat = with(IRIDESCENCE, [1.0, 1.4, 100.0, 0.0], bare.clone());
@@ -268,10 +268,35 @@ fn a_film_without_thickness_changes_nothing() {
     }
 }
 
+/// A shadow ray through a sheet with a film loses what the film reflects, in every model.
+#[test]
+fn a_film_takes_its_colour_from_the_light_of_a_lamp() {
+    let gpu = Gpu::open();
+    let l = DVec3::new(0.5, 0.3, 1.0).normalize();
+    let clear = Material { transmission: 1.0, double_sided: true, ..plastic([1.0; 3], 0.0) };
+    for thickness in [150.0, 400.0] {
+        let sheet = with(IRIDESCENCE, [1.0, 1.9, 100.0, thickness], clear.clone());
+        let passes = 1.0 - film(&sheet, l.z).max_element();
+        let mut made = Made::new("a film before a lamp");
+        made.add(Shape::panel(4.0, 4.0), lambert([0.5; 3]), at(0.0, 0.0, 0.0));
+        made.add(Shape::panel(4.0, 4.0), sheet, at(0.0, 0.0, 1.0));
+        // Below the sheet, onto the middle of the floor.
+        made.camera(DVec3::new(0.0, -3.0, 0.6), DVec3::ZERO, orthographic(0.1));
+        let scene = directional(made.0, l);
+        let expected = rgb(IRRADIANCE) * (0.5 / PI * l.z * passes);
+        for (of, choices) in [(Model::Recursive, "indirect=off"), (Model::Global, "interfaces=1")] {
+            let seen = gpu.film(&scene, model(of, [16, 16], &["fresnel=exact", choices]));
+            let pixel = rgb([0, 1, 2].map(|channel| seen.rgba[136][channel]));
+            let error = (pixel / expected - 1.0).abs().max_element();
+            assert!(error < 1e-3, "{of:?}, {thickness} nm: {pixel} is {expected}");
+        }
+    }
+}
+
 /// In bands of wavelengths the film needs no sensitivities: Airy's closed form at the middle of each band, integrated.
 #[test]
 fn by_wavelength_a_film_is_the_integral_over_the_spectrum() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let l = DVec3::new(0.3, 0.4, 1.0).normalize();
     let (scene, facets) = dome(&bubbles()[..3]);
     let mut made = Made(scene);
@@ -337,7 +362,7 @@ fn shines_through(m: &Material, n: DVec3, l: DVec3, v: DVec3) -> DVec3 {
 
 #[test]
 fn light_from_behind_shines_through_leaves() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let l = DVec3::new(0.1, 0.05, -1.0).normalize();
     let choices = ["brdf=ggx", "fresnel=schlick"];
     let (scene, facets) = dome(&leaves());
@@ -365,7 +390,7 @@ fn light_from_behind_shines_through_leaves() {
 
 #[test]
 fn what_is_transmitted_is_not_reflected() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let l = DVec3::new(0.2, 0.5, 1.0).normalize();
     let lit = |m: &Material| directional(dome(std::slice::from_ref(m)).0, l);
     for of in MODELS {
@@ -378,7 +403,7 @@ fn what_is_transmitted_is_not_reflected() {
 /// A white sheet in uniform light from both sides shows that light, whatever share passes through it.
 #[test]
 fn a_white_leaf_vanishes_in_uniform_light() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let sky = Environment::constant([0.5; 3]);
     let mut made = Made::new("leaf");
     made.add(
@@ -398,7 +423,7 @@ fn a_white_leaf_vanishes_in_uniform_light() {
 /// The background does not count as light straight ahead, but light from behind that scatters in a leaf does.
 #[test]
 fn light_from_behind_shines_through_leaves_before_a_transparent_background() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let sky = Environment::constant([0.5; 3]);
     let mut made = Made::new("leaf");
     let leaf = leaf(1.0, [1.0; 3], Material { double_sided: true, ..lambert([1.0; 3]) });
@@ -414,7 +439,7 @@ fn light_from_behind_shines_through_leaves_before_a_transparent_background() {
 /// A lamp behind a leaf, and a black card before the lamp or before the leaf.
 #[test]
 fn shadow_rays_start_on_the_side_of_the_light() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let lit = |card: Option<f64>| {
         let mut made = Made::new("leaf and lamp");
         let leaf = leaf(0.5, [1.0; 3], Material { double_sided: true, ..lambert([0.5; 3]) });
@@ -462,7 +487,7 @@ fn of_one_texel(material: &Material, rgba: [u8; 4], l: DVec3) -> Scene {
 /// A texture is the product with its texel, and something else than no texture.
 #[test]
 fn textures_multiply_the_factors_of_lobes() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let linear = |byte: f32| ((byte / 255.0 + 0.055) / 1.055).powf(2.4);
     let byte = |byte: f32| byte / 255.0;
     let lobe = |lobe: usize, factors: [f32; 4], texel: [f32; 4], below: &Material| {
