@@ -360,7 +360,8 @@ vec2 cos_sin_of_turns(float turns) {
     return r;
 }
 
+// Vulkan says nothing about its cosine of more than half a turn.
 float cos_of_turns(float turns) {
-    return cos_sin_of_turns(turns).x;
+    return cos_sin_of_turns(ARITHMETIC == FAST ? turns - floor(turns + 0.5) : turns).x;
 }
 #endif

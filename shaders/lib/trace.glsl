@@ -260,12 +260,11 @@ HitPair traverse_links_pair(TriangleRay ra, vec3 da, float ta, TriangleRay rb, v
 const uint TRACING_LANES = 64;
 // Entries of a short stack; a power of two.
 const uint SHORT_STACK = 8;
-// Words of the stacks of a workgroup; 1 where the traversal has none.
-layout(constant) const uint STACK_WORDS = 1;
 // Entry by entry: neighbouring invocations access neighbouring words.
-shared int traversal_stacks[STACK_WORDS];
+shared int traversal_stacks[TRAVERSAL == STACK ? SHORT_STACK * TRACING_LANES : 1u];
 
 // The way from the root of the BVH to a node, one bit for each level.
+const uint TRAIL_LEVELS = 64;
 struct Trail {
     uint level;    // of the node; the root has 0
     uvec2 right;   // the way goes to the right child

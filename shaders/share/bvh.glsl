@@ -23,7 +23,7 @@ struct FloatNode {
     uint pad;
 };
 
-// Node for traversal with a stack: boxes and references (a node or a leaf) of both children.
+// Node for traversal with a short stack: boxes and references (a node or a leaf) of both children.
 struct StackNode {
     vec3 left_center;
     int left;

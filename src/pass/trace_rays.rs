@@ -101,8 +101,8 @@ impl Tracer {
         let output = Buffer::new(&self.device, "hits", bytes, Place::Readback)?;
         let per_group = if mode.pairs { 128 } else { 64 };
         let blocks = (rays.len() as u32).div_ceil(per_group).div_ceil(32);
-        let TraceConstants { traversal, octants, stack_words, .. } = self.rays.constants;
-        let trace = lib::trace::Constants { traversal, octants, stack_words };
+        let TraceConstants { traversal, octants, .. } = self.rays.constants;
+        let trace = lib::trace::Constants { traversal, octants };
         let constants = trace_rays::Constants {
             any_hit: mode.any_hit,
             pairs: mode.pairs,

@@ -13,7 +13,7 @@ pub enum Architecture {
     #[default]
     Cpu,
     /// Thousands of invocations that share registers and caches: one path per invocation, kernels for rays and kernels
-    /// for surfaces, traversal with branches and a stack in shared memory, neighbouring tiles in neighbouring
+    /// for surfaces, traversal with branches and a short stack in shared memory, neighbouring tiles in neighbouring
     /// workgroups.
     Gpu,
 }

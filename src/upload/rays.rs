@@ -25,7 +25,7 @@ use crate::prepare::{Hierarchy, Prepared, ray_offset};
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Mesh, Scene, Shared};
 use crate::shader::lib;
-use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, SHORT_STACK, STACK, TRACING_LANES};
+use crate::shader::lib::trace::{FILTER, LINKS_16, LINKS_32, OCTANT_LISTS, OPAQUE, STACK, TRAIL_LEVELS};
 use crate::share::{
     self, BvhTriangle, CornerColors, CornerFrame, CornerTangents, CornerUvs, MATERIAL_OF_TRIANGLE, ONE_SIDED_TRIANGLE,
     SHEET_TRIANGLE, TraceTerms, WorkCounts,
@@ -40,9 +40,6 @@ use crate::transport::photon_map::PhotonEmission;
 /// copies of the BVH.
 const MOST_ORDERED_BYTES: usize = 256 << 20;
 
-/// Levels of the BVH that traversal with a short stack follows: its trail has a bit for each.
-const MOST_STACKED: u32 = 64;
-
 /// The BVH traversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -52,7 +49,7 @@ pub enum Traversal {
     /// Stackless traversal by skip pointers, with nodes of 32 bytes, for scenes whose boxes are too small for a 16-bit
     /// grid.
     Links32 = LINKS_32 as isize,
-    /// Traversal with a stack; nodes of 64 bytes hold the boxes of both children.
+    /// Traversal with a short stack; nodes of 64 bytes hold the boxes of both children.
     Stack = STACK as isize,
 }
 
@@ -88,8 +85,6 @@ pub struct TraceConstants {
     pub traversal: u32,
     /// Whether nearest-hit rays use octant-ordered node lists.
     pub octants: bool,
-    /// Words of the traversal stacks of a workgroup.
-    pub stack_words: u32,
     /// Vertex attributes and texture slots that ray hits read.
     pub hit: lib::hit::Constants,
     /// [`BvhFacts::touching`].
@@ -99,7 +94,7 @@ pub struct TraceConstants {
 impl Default for TraceConstants {
     /// Constants of shaders that send no rays.
     fn default() -> Self {
-        Self { traversal: 0, octants: false, stack_words: 1, hit: lib::hit::Constants::default(), touching: false }
+        Self { traversal: 0, octants: false, hit: lib::hit::Constants::default(), touching: false }
     }
 }
 
@@ -149,14 +144,15 @@ impl RaysOnDevice {
         };
         let &Hierarchy { ref bvh, build_ms, offset, touching, .. } = hierarchy;
         let start = std::time::Instant::now();
-        // The traversal: with a stack on GPUs, where it is small enough; 16-bit boxes where these are precise enough.
+        // The traversal: with a short stack on GPUs, where its trail is long enough; 16-bit boxes where these are
+        // precise enough.
         let by_links = if bvh.fits_grid() { Traversal::Links16 } else { Traversal::Links32 };
-        let stacks = plan.architecture == Architecture::Gpu && bvh.depth <= MOST_STACKED;
+        let stacks = plan.architecture == Architecture::Gpu && bvh.depth <= TRAIL_LEVELS;
         let default = if stacks { Traversal::Stack } else { by_links };
         let traversal = traversal.unwrap_or(default);
-        if traversal == Traversal::Stack && bvh.depth > MOST_STACKED {
+        if traversal == Traversal::Stack && bvh.depth > TRAIL_LEVELS {
             let (name, depth) = (&scene.name, bvh.depth);
-            bail!("{name}: traversal with a stack follows at most {MOST_STACKED} levels of the BVH, it has {depth}");
+            bail!("{name}: traversal with a stack follows at most {TRAIL_LEVELS} levels of the BVH, it has {depth}");
         }
         let format = if traversal == Traversal::Links32 { Format::Float } else { Format::Quantised };
         // One node list per octant of directions is front to back for every ray, as long as eight copies of the BVH are
@@ -244,13 +240,7 @@ impl RaysOnDevice {
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             snap_pixels: device.snap_pixels(),
             counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
-            constants: TraceConstants {
-                traversal: traversal as u32,
-                octants,
-                stack_words: if traversal == Traversal::Stack { SHORT_STACK * TRACING_LANES } else { 1 },
-                hit: corners.contents,
-                touching,
-            },
+            constants: TraceConstants { traversal: traversal as u32, octants, hit: corners.contents, touching },
             facts: Some(BvhFacts {
                 build_ms,
                 layout_ms,
@@ -585,12 +575,12 @@ fn bodies(scene: &Scene, solids: &Solids, rays: Rays) -> Scene {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::shader::PROGRAMS;
+    use crate::shader::lib::trace::TRACING_LANES;
 
     #[test]
     fn programs_that_trace_have_as_many_invocations_as_traversal_stacks() {
-        let traces = |program: &&&crate::gpu::Program| program.constants.iter().any(|c| c.name == "stack_words");
+        let traces = |program: &&&crate::gpu::Program| program.constants.iter().any(|c| c.name == "traversal");
         let tracing: Vec<_> = PROGRAMS.iter().filter(traces).collect();
         assert!(tracing.len() > 6, "{}", tracing.len());
         for program in tracing {

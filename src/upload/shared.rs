@@ -194,11 +194,7 @@ impl<'a> OnDevice<'a> {
                 mirror_rays: with.mirrors,
                 roughest_mirror: plan.roughest_mirror,
             },
-            trace: lib::trace::Constants {
-                traversal: rays.constants.traversal,
-                octants: rays.constants.octants,
-                stack_words: rays.constants.stack_words,
-            },
+            trace: lib::trace::Constants { traversal: rays.constants.traversal, octants: rays.constants.octants },
         }
     }
 }
