@@ -177,8 +177,8 @@ pub fn parse(words: Vec<OsString>) -> Result<Arguments, clap::Error> {
 /// Those of the command.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let (quiet, whole) = (arguments.quiet, arguments.verbose > 0);
-    // A passport measures how long the driver compiles.
-    if !matches!(arguments.command, Command::Passport(_))
+    // These measure how long the driver compiles.
+    if !matches!(arguments.command, Command::Passport(_) | Command::Cost(_))
         && let Some(folder) = cache_folder()
     {
         keep_pipelines_in(folder.join("pipelines"));

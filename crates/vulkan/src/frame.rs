@@ -2,7 +2,7 @@
 //!
 //! Read the Vulkan specification, chapters Render Pass (Dynamic Rendering), Dispatching Commands, Drawing Commands and
 //! Queries. Passes are plain data (`Vec<Pass>`) until [`Frame::finish`] records them in order, submits them, and waits.
-//! Labels, object names, timestamps and barriers are automatic. New pipelines are created on another thread, and while
+//! Labels, object names, timestamps and barriers are automatic. New pipelines are created on other threads, and while
 //! a pass waits for its pipeline, the device already executes the earlier passes.
 
 use std::cell::Cell;

@@ -1,4 +1,5 @@
-//! The driver's pipeline cache, kept in a file for each device and driver: later processes do not compile again.
+//! The driver's pipeline cache, kept in a file for each device and driver, beside what the driver keeps itself: later
+//! processes do not compile again.
 //!
 //! Read the Vulkan specification, section Pipeline Cache. Drivers check the header of what they are given, and trust
 //! the rest: a file therefore begins with a hash of its content, and one that was cut off or changed is not used. Two
@@ -13,8 +14,10 @@ use std::{fs, io};
 use ash::vk;
 use xxhash_rust::xxh3::xxh3_128;
 
-/// Largest file that is read or written. The pipelines of a plan take some 5 MB.
-const MOST_BYTES: u64 = 256 << 20;
+/// Largest content of a file that is read or written: two thousand plans of RADV.
+const MOST_BYTES: usize = 256 << 20;
+/// Bytes of the hash before the content.
+const HASH: usize = size_of::<u128>();
 /// Bytes of the header that the specification demands (`VkPipelineCacheHeaderVersionOne`).
 const HEADER: usize = 32;
 
@@ -54,7 +57,10 @@ impl KeptPipelines {
                 let loaded = (!content.is_empty()).then(|| xxh3_128(&content));
                 Self { raw, file: Some(file), loaded, ..none }
             }
-            Err(_) => none,
+            Err(error) => {
+                tracing::info!("{}: not used as pipeline cache: {error}", file.display());
+                none
+            }
         }
     }
 
@@ -120,7 +126,7 @@ fn file_name(properties: &vk::PhysicalDeviceProperties) -> String {
 
 fn create(device: &ash::Device, content: &[u8]) -> Result<vk::PipelineCache, vk::Result> {
     let info = vk::PipelineCacheCreateInfo::default().initial_data(content);
-    // SAFETY: the driver wrote the content, as its hash says, and checks the header.
+    // SAFETY: the content is as the driver gave it, by its hash, and the driver checks the header.
     unsafe { device.create_pipeline_cache(&info, None) }
 }
 
@@ -129,11 +135,11 @@ fn create(device: &ash::Device, content: &[u8]) -> Result<vk::PipelineCache, vk:
 /// # Errors
 /// It cannot be read, or is not what was written.
 fn read(file: &Path) -> io::Result<Vec<u8>> {
-    if fs::metadata(file)?.len() > MOST_BYTES {
+    if fs::metadata(file)?.len() > (HASH + MOST_BYTES) as u64 {
         return Err(io::Error::other("it is too large"));
     }
     let mut bytes = fs::read(file)?;
-    let content = bytes.split_off(bytes.len().min(size_of::<u128>()));
+    let content = bytes.split_off(bytes.len().min(HASH));
     if bytes != xxh3_128(&content).to_le_bytes() || content.len() <= HEADER {
         return Err(io::Error::other("it is damaged"));
     }
@@ -145,7 +151,7 @@ fn read(file: &Path) -> io::Result<Vec<u8>> {
 /// # Errors
 /// It cannot be written.
 fn write(file: &Path, content: &[u8]) -> io::Result<()> {
-    if content.len() as u64 > MOST_BYTES {
+    if content.len() > MOST_BYTES {
         return Err(io::Error::other("it is too large"));
     }
     let folder = file.parent().ok_or_else(|| io::Error::other("it has no folder"))?;

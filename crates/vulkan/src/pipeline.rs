@@ -58,6 +58,22 @@ impl Pipelines<'_> {
     }
 }
 
+/// Calls `make` once for each of `all`, in their order, from as many threads, of which the calling one is the first.
+fn in_threads<T: Copy + Sync>(threads: usize, all: &[T], make: impl Fn(T) + Sync) {
+    let next = AtomicUsize::new(0);
+    let make_some = || {
+        while let Some(&one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+            make(one);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads.min(all.len()) {
+            scope.spawn(make_some);
+        }
+        make_some();
+    });
+}
+
 impl Device {
     /// Milliseconds spent in the creation of pipelines so far.
     #[must_use]
@@ -162,17 +178,8 @@ impl Device {
         let make_all = || {
             let _end = Settled(&pipelines);
             let start = Instant::now();
-            let next = AtomicUsize::new(0);
-            let make_some = || {
-                while let Some(&key) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let _ = pipelines.slots[key].set(self.make(key));
-                }
-            };
-            std::thread::scope(|scope| {
-                for _ in 1..self.compiling_threads().min(missing.len()) {
-                    scope.spawn(make_some);
-                }
-                make_some();
+            in_threads(self.compiling_threads(), &missing, |key| {
+                let _ = pipelines.slots[key].set(self.make(key));
             });
             lock(&self.caches).making_ms += start.elapsed().as_secs_f64() * 1e3;
         };
@@ -383,5 +390,36 @@ impl Device {
         let made = unsafe { self.raw.create_graphics_pipelines(self.kept_pipelines.raw, &[info], None) };
         self.kept_pipelines.note(told);
         made.map(|p| p[0]).map_err(|(_, error)| error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+    use std::thread::ThreadId;
+
+    use super::*;
+
+    #[test]
+    fn each_is_made_once_by_as_many_threads() {
+        for (threads, count) in [(1, 5), (3, 2), (4, 9), (8, 0)] {
+            let all: Vec<usize> = (0..count).collect();
+            let made: Mutex<Vec<(usize, ThreadId)>> = Mutex::default();
+            let together = std::sync::Barrier::new(threads.min(count).max(1));
+            in_threads(threads, &all, |one| {
+                if one < threads {
+                    // The first ones wait for each other: a thread has one of them each.
+                    together.wait();
+                }
+                lock(&made).push((one, std::thread::current().id()));
+            });
+            let mut made = made.into_inner().expect("no panic");
+            made.sort_by_key(|(one, _)| *one);
+            assert!(made.iter().map(|(one, _)| *one).eq(0..count), "{threads} threads, {count}: {made:?}");
+            let mut ids: Vec<_> = made.iter().map(|(_, id)| format!("{id:?}")).collect();
+            ids.sort();
+            ids.dedup();
+            assert_eq!(ids.len(), threads.min(count), "{made:?}");
+        }
     }
 }
