@@ -13,7 +13,7 @@ const TABLE: f64 = 1e-3;
 
 #[test]
 fn no_study_scene_shows_in_a_white_furnace() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     // Into the closed room of the pool no light comes.
     for &name in study::NAMES.iter().filter(|&&name| name != "pool") {
         let scene = study::load(name).expect("a scene");

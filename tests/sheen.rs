@@ -74,7 +74,7 @@ const BRIGHT: f64 = 0.1;
 
 #[test]
 fn cloth_reflects_a_light_as_estevez_and_kulla_say() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     for of in MODELS {
         for light in [DVec3::new(0.2, 0.5, 1.0), DVec3::new(-0.7, 0.15, 0.4)] {
             let (mut scene, facets) = dome(&cloths());
@@ -107,7 +107,7 @@ fn furnace(m: &Material, cos_v: f64) -> DVec3 {
 
 #[test]
 fn white_cloth_sends_no_more_than_it_receives() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let sky = Environment::constant([1.0; 3]);
     let white = lambert([1.0; 3]);
     let cloths = [
@@ -143,7 +143,7 @@ fn texture(image: usize) -> TextureRef {
 
 #[test]
 fn textures_multiply_its_colour_and_roughness() {
-    let gpu = Gpu::hasty();
+    let gpu = Gpu::open();
     let ground = plastic([0.3, 0.3, 0.3], 0.7);
     let told = with_sheen([0.9, 0.6, 0.8], 0.9, ground.clone());
     let mut textured = told.clone();

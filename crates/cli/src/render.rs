@@ -1,6 +1,6 @@
 //! `etalon render` of one picture. Sequences are drawn in `sequence.rs`, parts of a picture in `shard.rs`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, IsTerminal as _};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,20 +53,27 @@ impl Phases {
 /// # Errors
 /// One sentence with the action, its object and the cause.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
-    let drawn = |args: &RenderArgs| match args.sequence.shard {
-        _ if args.sequence.is_sequence() => sequence::run(args, quiet),
-        Some(part) => shard::run(args, part, quiet),
-        None => draw(args, quiet),
-    };
-    match drawn(args) {
+    let mut written = BTreeSet::new();
+    match draw_any(args, quiet, &mut written) {
         Err(error) if is_lost(&error) => {
             // Frames whose files are complete are not drawn again.
             let what = if args.sequence.is_sequence() { "what is missing" } else { "the picture" };
             tracing::warn!("{error:#}; {what} is drawn once more, in short submissions");
             let device = DeviceOptions { short_submissions: true, ..args.device.clone() };
-            drawn(&RenderArgs { device, ..args.clone() })
+            draw_any(&RenderArgs { device, ..args.clone() }, quiet, &mut written)
         }
         drawn => drawn,
+    }
+}
+
+/// Draws a sequence, a part or a picture. `written` has the frames that this command has told to be there.
+fn draw_any(args: &RenderArgs, quiet: bool, written: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
+    if args.sequence.is_sequence() {
+        return sequence::run(args, quiet, written);
+    }
+    match args.sequence.shard {
+        Some(part) => shard::run(args, part, quiet),
+        None => draw(args, quiet),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `etalon render` of a sequence: frames of an animation, a turntable, or several cameras. Data that all pictures share
 //! is read, uploaded and compiled once. See docs/farm.md.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -216,7 +217,7 @@ fn holds(path: &Path, format: Format, picture: &str) -> Option<(Vec<u8>, Option<
 ///
 /// # Errors
 /// One sentence with the action, its object and the cause; an error of a picture also names its frame.
-pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
+pub fn run(args: &RenderArgs, quiet: bool, written: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
     let begun = Instant::now();
     let mut settings = args.render_settings()?;
     usage(check_halves(&args.aov, &settings))?;
@@ -260,7 +261,7 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     settings.exposure = exposure.stops;
     [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.tell(line));
     let (_, settings) = opened.lit(settings);
-    let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings };
+    let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings, written };
     let mut pictures: Vec<PictureRecord> = Vec::new();
     let mut shown: Vec<Display> = Vec::new();
     let of = (wanted.frames.len() * fixed.len()).max(1) as f64;
@@ -330,6 +331,15 @@ pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Prints the path of a file that is there; whether it is told for the first time.
+fn tell(path: &Path, written: &mut BTreeSet<PathBuf>) -> Result<bool> {
+    let is_new = written.insert(path.to_owned());
+    if is_new {
+        print(&path.display().to_string())?;
+    }
+    Ok(is_new)
+}
+
 /// Draws the pictures of a sequence one after another with one renderer.
 struct Drawer<'a> {
     args: &'a RenderArgs,
@@ -338,6 +348,8 @@ struct Drawer<'a> {
     /// Whether the scene has changed since the renderer was made.
     moved: bool,
     settings: Settings,
+    /// Files that were told: a command that lost its device finds them again.
+    written: &'a mut BTreeSet<PathBuf>,
 }
 
 impl Drawer<'_> {
@@ -374,7 +386,7 @@ impl Drawer<'_> {
             for ((path, _), (bytes, shown)) in files.iter().zip(found) {
                 display = display.or(shown);
                 told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
-                print(&path.display().to_string())?;
+                told.found &= tell(path, self.written)?;
             }
             return Ok((told, display));
         }
@@ -411,7 +423,7 @@ impl Drawer<'_> {
             };
             file::write(path, &bytes)?;
             told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
-            print(&path.display().to_string())?;
+            tell(path, self.written)?;
         }
         told.write_ms = writing.elapsed().as_secs_f64() * 1e3;
         let [width, height] = self.settings.size;

@@ -3,7 +3,10 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
+use etalon::gpu::specialized;
+use etalon::shader::PROGRAMS;
 use etalon_mask::{Description, Mask};
 
 #[path = "support/program.rs"]
@@ -152,8 +155,14 @@ fn sequences_and_parts_are_tried_once_more_too() {
     let file = |name: &str| std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let frames = |to: &'static str| [&common[..], &["--turntable", "3", "-o", to]].concat();
     etalon(folder, &frames("whole{frame}.exr"), &HASTY).succeeded();
-    let run = with_fault(folder, r#"{ "lost_at_submission": 8 }"#, &frames("again{frame}.exr")).succeeded();
+    let arguments = [frames("again{frame}.exr"), vec!["--report", "frames.json"]].concat();
+    let run = with_fault(folder, r#"{ "lost_at_submission": 24 }"#, &arguments).succeeded();
     assert!(run.stderr.contains("what is missing is drawn once more, in short submissions"), "{run:?}");
+    assert_eq!(run.stdout, "again0.exr\nagain1.exr\nagain2.exr\n", "each once");
+    let report: serde_json::Value = serde_json::from_slice(&file("frames.json")).expect("JSON");
+    let frames = report["pictures"].as_array().expect("pictures");
+    let drawn_before = |frame: &&serde_json::Value| frame["found"] == false && frame["draw_ms"] == 0.0;
+    assert_eq!(frames.iter().filter(drawn_before).count(), 1, "the first one is not drawn again: {report}");
     for frame in 0..3 {
         assert!(file(&format!("whole{frame}.exr")) == file(&format!("again{frame}.exr")), "frame {frame}");
     }
@@ -166,18 +175,56 @@ fn sequences_and_parts_are_tried_once_more_too() {
     assert_eq!(diff.stdout, "mae 0\n", "a part");
 }
 
-/// Work is cut by its pace; a clock that stands still, or runs a million times too fast, changes no bit.
+/// Short submissions are cut by their measured pace; a clock that stands still, or runs a million times too fast,
+/// changes no bit.
 #[test]
 fn timestamps_may_be_wrong() {
     let folder = tempfile::tempdir().expect("a folder");
     let render = |to: &'static str| ["render", "study:cornell", "--model", "global", "--size", "64x36", "-o", to];
     etalon(folder.path(), &render("here.exr"), &HASTY).succeeded();
     for factor in [0, 1_000_000] {
-        let fault = format!("{{ \"timestamps_times\": {factor} }}");
-        with_fault(folder.path(), &fault, &render("there.exr")).succeeded();
+        // A lost device is what makes submissions short on a CPU.
+        let fault = format!("{{ \"timestamps_times\": {factor}, \"lost_at_submission\": 1 }}");
+        let run = with_fault(folder.path(), &fault, &render("there.exr")).succeeded();
+        assert!(run.stderr.contains("in short submissions"), "{run:?}");
         let diff = etalon(folder.path(), &["diff", "--metric", "mae", "here.exr", "there.exr"], &[]).succeeded();
         assert_eq!(diff.stdout, "mae 0\n", "times {factor}");
     }
+}
+
+/// What the layer makes of every shader is SPIR-V that a driver may get.
+#[test]
+fn rewritten_shaders_are_valid() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let described = |text: &str| {
+        std::fs::write(folder.path().join("x.json"), text).expect("a file");
+        Description::read(&folder.path().join("x.json")).expect("a description")
+    };
+    let reverses = described(r#"{ "reverses": true }"#);
+    let all = described(
+        r#"{ "reverses": true, "contracts": true,
+            "inexact": { "division": 2, "root": 3, "inverse_root": 1, "power": 2, "angle": 4096 } }"#,
+    );
+    let (mut reversed, mut checked) = (0, 0);
+    for program in PROGRAMS {
+        for stage in program.stages {
+            // Everything that can be switched on.
+            let constants: Vec<(u32, u32)> = program.constants.iter().map(|constant| (constant.id, 1)).collect();
+            let words = specialized(stage.words, &constants);
+            let in_order = reverses.rewritten(&words).is_some();
+            assert!(!in_order || program.stages.len() == 1, "{}: a raster stage has no workgroups", program.name);
+            reversed += usize::from(in_order);
+            let Some(words) = all.rewritten(&words) else { continue };
+            let file = folder.path().join("x.spv");
+            let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            std::fs::write(&file, bytes).expect("a file");
+            let arguments = ["--target-env", "vulkan1.3", "--scalar-block-layout"];
+            let run = Command::new("spirv-val").args(arguments).arg(&file).output().expect("spirv-val of spirv-tools");
+            assert!(run.status.success(), "{}: {}", program.name, String::from_utf8_lossy(&run.stdout));
+            checked += 1;
+        }
+    }
+    assert!(reversed > 20 && checked > 25, "{reversed} reversed, {checked} checked");
 }
 
 /// What the driver has compiled is kept for later processes, and given back to it as it was or not at all.
@@ -188,9 +235,9 @@ fn compiled_pipelines_are_kept_in_a_file() {
     std::fs::write(&file, r#"{ "keeps_pipelines": true }"#).expect("a file");
     let masked = Masked::new(folder.path(), &file);
     let draw = |masked: &Masked<'_>| {
-        let _ = std::fs::remove_file(file.with_extension("cached"));
+        let _ = std::fs::remove_file(file.with_extension("noted"));
         masked.run(&["render", "study:cornell", "--model", "local", "--size", "8x8", "-o", "x.png"]).succeeded();
-        std::fs::read(file.with_extension("cached")).unwrap_or_default()
+        std::fs::read(file.with_extension("noted")).unwrap_or_default()
     };
     let kept = || -> Vec<PathBuf> {
         let files = std::fs::read_dir(folder.path().join("cache/etalon/pipelines")).into_iter().flatten();
@@ -306,7 +353,7 @@ fn contraction_and_coarse_angles_break_no_bound() {
 
 /// Quotients, roots and products that are off change no decision that is seen: once 60/60 < 1 repeated a texture a
 /// texel too late, (1 − F₀)/(1 − F₀) < 1 missed total internal reflection, and one minus a mean of ones that was fused
-/// was no 0, so that open surfaces were occluded from anywhere (mean FLIP 0.031, 0.0018 and 0.0034).
+/// was no 0, so that open surfaces had light from any side (mean FLIP 0.031, 0.0018 and 0.0034).
 #[test]
 fn inexact_arithmetic_is_not_seen() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -333,8 +380,8 @@ fn inexact_arithmetic_is_not_seen() {
     }
 }
 
-/// Memory that is full of NaN, workgroups in another order, and lavapipe's narrower vectors with other subgroups: what
-/// is read was written, and no sum depends on who came first or is beside whom.
+/// Memory that is full of NaN, workgroups in the reverse order, and lavapipe's narrower vectors with other subgroups:
+/// what is read was written, and no sum depends on who came first or is beside whom.
 #[test]
 fn neither_old_memory_nor_order_nor_the_width_of_vectors_is_seen() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -348,8 +395,8 @@ fn neither_old_memory_nor_order_nor_the_width_of_vectors_is_seen() {
         };
         with_fault(folder.path(), "{ \"dirty_memory\": true }", &render("other.exr")).succeeded();
         same("dirty memory");
-        with_fault(folder.path(), "{ \"reorders\": true }", &render("other.exr")).succeeded();
-        same("workgroups in another order");
+        with_fault(folder.path(), "{ \"reverses\": true }", &render("other.exr")).succeeded();
+        same("workgroups in the reverse order");
         // Mesa's cache does not tell code for wide vectors from code for narrow ones.
         let narrow = [("LP_NATIVE_VECTOR_WIDTH", "128"), ("MESA_SHADER_CACHE_DISABLE", "true")];
         let narrow: Vec<_> = HASTY.into_iter().chain(narrow).collect();

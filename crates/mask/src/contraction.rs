@@ -1,8 +1,9 @@
-//! Arithmetic that is contracted wherever Vulkan allows it, as the compilers of GPUs do: a product and a sum without
-//! `NoContraction` become one fused multiply-add, with one rounding.
+//! Contracted arithmetic, as the compilers of GPUs make it: a product and a sum without `NoContraction` become one
+//! fused multiply-add, and so do the steps of dot products and `fma`. Of a sum of two products the first is fused.
 //!
 //! Read the SPIR-V specification, decoration `NoContraction`. A fused multiply-add is computed in double precision,
-//! where the product of two floats is exact and the sum has 29 more bits.
+//! where the product of two floats is exact and the sum has 29 more bits. Left as they are: products with matrices, and
+//! what a driver makes of `mix`, `cross`, `normalize` and `length`.
 
 use std::collections::{HashMap, HashSet};
 

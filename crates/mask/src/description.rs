@@ -49,20 +49,30 @@ pub struct Description {
     pub dirty_memory: bool,
     /// Factor of all timestamps: 0 for a clock that stands still, or much for one that runs too fast.
     pub timestamps_times: Option<u64>,
-    /// What asking for a window's next picture comes to, in turns: `TIMEOUT`, `OUT_OF_DATE`, `SURFACE_LOST`, or nothing
-    /// for the picture.
-    pub acquire: Vec<String>,
-    /// Pipeline caches have content: 1,000 bytes behind the header. What a cache begins with is appended to the file
-    /// `NAME.cached` beside the description.
+    /// What asking for a window's next picture comes to, in turns. Each fault is noted in the file `NAME.noted` beside
+    /// the description.
+    pub(crate) acquire: Vec<Acquired>,
+    /// Pipeline caches have content: 1,000 bytes behind the header. What a cache begins with is noted in `NAME.noted`.
     pub keeps_pipelines: bool,
     /// Errors of arithmetic operations.
     pub(crate) inexact: Inexact,
-    /// Products and sums are fused wherever the specification allows it.
+    /// Products are fused with the sums that they are in, as the specification allows (`contraction.rs`).
     pub contracts: bool,
-    /// Workgroups run in another order.
-    pub reorders: bool,
+    /// Workgroups run in the reverse order.
+    pub reverses: bool,
     /// Words in the program's expected refusal. Empty: the program is expected to render.
     pub refused: Vec<String>,
+}
+
+/// What comes of asking for a window's next picture.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(rename_all = "SCREAMING_SNAKE_CASE")]
+pub(crate) enum Acquired {
+    Picture,
+    NotReady,
+    Timeout,
+    OutOfDate,
+    SurfaceLost,
 }
 
 /// What is read of a passport.
@@ -115,7 +125,7 @@ impl From<MailedPassport> for Description {
             dirty_memory: false,
             inexact: Inexact::default(),
             contracts: false,
-            reorders: false,
+            reverses: false,
             lost_at_submission: None,
             no_memory_from_allocation: None,
             timestamps_times: None,
@@ -158,28 +168,32 @@ impl Description {
     }
 
     /// The SPIR-V that the driver gets; `None` for the given one.
-    pub(crate) fn rewritten(&self, words: &[u32]) -> Option<Vec<u32>> {
+    #[must_use]
+    pub fn rewritten(&self, words: &[u32]) -> Option<Vec<u32>> {
         let inexact = self.inexact.rewritten(words);
         let contracted = self.contracts.then(|| contracted(inexact.as_deref().unwrap_or(words))).flatten().or(inexact);
-        let reordered = self.reorders.then(|| reordered(contracted.as_deref().unwrap_or(words))).flatten();
+        let reordered = self.reverses.then(|| reordered(contracted.as_deref().unwrap_or(words))).flatten();
         reordered.or(contracted)
     }
 
     /// What the nth request for a window's picture comes to, in place of the picture.
     pub(crate) fn acquired(&self, number: u64) -> Option<vk::Result> {
         let turn = number.checked_rem(self.acquire.len() as u64)?;
-        match self.acquire[turn as usize].as_str() {
-            "TIMEOUT" => Some(vk::Result::TIMEOUT),
-            "OUT_OF_DATE" => Some(vk::Result::ERROR_OUT_OF_DATE_KHR),
-            "SURFACE_LOST" => Some(vk::Result::ERROR_SURFACE_LOST_KHR),
-            _ => None,
-        }
+        let fault = match self.acquire[turn as usize] {
+            Acquired::Picture => return None,
+            Acquired::NotReady => vk::Result::NOT_READY,
+            Acquired::Timeout => vk::Result::TIMEOUT,
+            Acquired::OutOfDate => vk::Result::ERROR_OUT_OF_DATE_KHR,
+            Acquired::SurfaceLost => vk::Result::ERROR_SURFACE_LOST_KHR,
+        };
+        Self::note(format!("{fault:?}\n").as_bytes());
+        Some(fault)
     }
 
-    /// Notes the bytes with which a pipeline cache begins.
-    pub(crate) fn note_cached(bytes: &[u8]) {
+    /// Appends to the file of notes.
+    pub(crate) fn note(bytes: &[u8]) {
         let Some(path) = std::env::var_os(VARIABLE).map(PathBuf::from) else { return };
-        let noted = std::fs::OpenOptions::new().create(true).append(true).open(path.with_extension("cached"));
+        let noted = std::fs::OpenOptions::new().create(true).append(true).open(path.with_extension("noted"));
         if let Err(error) = noted.and_then(|mut file| file.write_all(bytes)) {
             eprintln!("the mask: {error}");
         }

@@ -512,7 +512,7 @@ unsafe extern "system" fn create_cache(
         let mut info = *info;
         if below().description.keeps_pipelines && info.initial_data_size > 0 {
             let bytes = std::slice::from_raw_parts(info.p_initial_data.cast::<u8>(), info.initial_data_size);
-            Description::note_cached(bytes);
+            Description::note(bytes);
             // The driver below knows nothing of the content.
             info.initial_data_size = info.initial_data_size.min(CACHE_HEADER);
         }

@@ -1,8 +1,9 @@
-//! Workgroups in another order: SPIR-V in which the first half of a dispatch's workgroups, in each dimension, does the
-//! work of the second, from the last one on.
+//! Workgroups in the reverse order: SPIR-V in which the first workgroup of a dispatch, in each dimension, does the work
+//! of the last.
 //!
 //! Read the Vulkan specification, section Dispatching Commands: no order of workgroups may be relied on. lavapipe runs
-//! them one after the other, so work that needs an order would never be noticed. For dispatches that begin at workgroup 0.
+//! them one after the other, so work that needs an order would never be noticed. For dispatches that begin at workgroup
+//! 0.
 
 use rspirv::binary::Assemble as _;
 use rspirv::dr::{Builder, Instruction, Operand};
@@ -10,7 +11,7 @@ use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, Op, StorageClass, Word};
 
 use crate::rewrite::loaded;
 
-/// The module with workgroups in another order; `None` if it is no module, or asks for no place in a dispatch.
+/// The module with workgroups in the reverse order; `None` if it is no module, or asks for no place in a dispatch.
 pub(crate) fn reordered(words: &[Word]) -> Option<Vec<Word>> {
     let (mut builder, modes) = loaded(words)?;
     let module = builder.module_ref();
@@ -53,10 +54,8 @@ pub(crate) fn reordered(words: &[Word]) -> Option<Vec<Word>> {
                 made
             })
         });
-    let [one, two] = [1, 2].map(|value| {
-        let one = builder.constant_bit32(uint, value);
-        builder.constant_composite(vector, vec![one; 3])
-    });
+    let one = builder.constant_bit32(uint, 1);
+    let one = builder.constant_composite(vector, vec![one; 3]);
     let size = builder.constant_composite(vector, sides);
     // What the program reads in place of the variables.
     let others = places.map(|place| {
@@ -75,12 +74,8 @@ pub(crate) fn reordered(words: &[Word]) -> Option<Vec<Word>> {
         result
     };
     let (count, group) = (write(&mut builder, Op::Load, &[count]), write(&mut builder, Op::Load, &[group]));
-    // (count − 1 − group + count / 2) mod count
     let last = write(&mut builder, Op::ISub, &[count, one]);
-    let mirrored = write(&mut builder, Op::ISub, &[last, group]);
-    let half = write(&mut builder, Op::UDiv, &[count, two]);
-    let shifted = write(&mut builder, Op::IAdd, &[mirrored, half]);
-    let other_group = write(&mut builder, Op::UMod, &[shifted, count]);
+    let other_group = write(&mut builder, Op::ISub, &[last, group]);
     let mut stored = Vec::new();
     if let Some((_, other)) = others[0] {
         stored.push([other, other_group]);
