@@ -7,13 +7,14 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use anyhow::Result;
-use etalon::gpu::{Buffer, Device, Frame, Place};
+use ash::vk;
+use etalon::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
 use etalon::optics::{SplitMix64, ulp};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::json::short;
-use crate::shader::builtin;
+use crate::shader::{builtin, filter};
 
 /// Errors of one built-in function or operation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,6 +58,10 @@ pub struct Arithmetic {
     pub min_of_nan: String,
     /// How `packHalf2x16` rounds: `nearest`, `down` or `other`.
     pub half_rounds: String,
+    /// Number of weights that a linear filter gives two texels, among 65,536 places between them: 257 with eight bits.
+    /// `None` in files from before it was measured.
+    #[serde(default)]
+    pub filter_weights: Option<usize>,
 }
 
 /// A function that is measured.
@@ -254,6 +259,27 @@ fn fused(device: &Arc<Device>, operation: u32, cases: usize) -> Result<f64> {
     Ok(short(f64::from(once as u32) / f64::from(of as u32).max(1.0)))
 }
 
+/// Number of different weights of two texels under a linear filter.
+fn filter_weights(device: &Arc<Device>) -> Result<usize> {
+    const PLACES: u32 = 1 << 16;
+    let format = vk::Format::R32G32B32A32_SFLOAT;
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    let image = Image::new(device, "two texels", ImageDesc::flat(format, 2, 1, usage))?;
+    let texels = Buffer::with_data(device, "black and white", &[[0.0_f32; 4], [1.0; 4]])?;
+    let weights = Buffer::new(device, "weights", 4 * u64::from(PLACES), Place::Readback)?;
+    let mut frame = Frame::new(device);
+    frame.upload("two texels", &texels, &image, 0, &[0]);
+    let two_texels = Sampled { image: &image, sampler: SamplerDesc::LINEAR };
+    let bind = filter::Bind { two_texels, weights: &weights };
+    frame.compute("filter", &bind, &filter::Constants {}, &filter::Push { count: PLACES }, [PLACES / 64, 1, 1])?;
+    frame.read_back(&weights);
+    frame.finish()?;
+    let mut found: Vec<u32> = weights.read(|bytes| bytemuck::pod_collect_to_vec(bytes));
+    found.sort_unstable();
+    found.dedup();
+    Ok(found.len())
+}
+
 /// Measures a device's arithmetic with so many inputs for each function.
 ///
 /// # Errors
@@ -282,5 +308,6 @@ pub fn measure(device: &Arc<Device>, cases: usize) -> Result<Arithmetic> {
             _ => "other",
         }
         .to_owned(),
+        filter_weights: Some(filter_weights(device)?),
     })
 }

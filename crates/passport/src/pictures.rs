@@ -64,6 +64,10 @@ pub struct Pictures {
     pub refused: Vec<String>,
     /// Other ways to draw a picture.
     pub ways: Vec<SamePicture>,
+    /// What the driver's compiler made of each stage of a program: the largest of each of its figures over all
+    /// pictures, by the driver's names. Empty where the driver tells nothing.
+    #[serde(default)]
+    pub compiled: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 /// A film with its facts, and the milliseconds of a first and a second drawing.
@@ -168,7 +172,8 @@ pub fn measure(
     size: [u32; 2],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Pictures> {
-    let mut pictures = Pictures { size, scenes: Vec::new(), refused: Vec::new(), ways: Vec::new() };
+    let mut pictures =
+        Pictures { size, scenes: Vec::new(), refused: Vec::new(), ways: Vec::new(), compiled: BTreeMap::new() };
     for scene in scenes {
         for model in [Model::Local, Model::Recursive, Model::Global] {
             progress(&format!("{scene}, {}", model.name()));
@@ -186,12 +191,33 @@ pub fn measure(
         Err(error) if etalon::gpu::is_lost(&error) => return Err(error),
         Err(error) => pictures.refused.push(format!("{first} in several ways: {error:#}")),
     }
+    for (program, constants) in device.pipelines() {
+        for compiled in device.compiled(program, &constants)? {
+            let known = pictures.compiled.entry(format!("{} {}", program.name, compiled.stage)).or_default();
+            keep_largest(known, &compiled.figures);
+        }
+    }
     Ok(pictures)
+}
+
+fn keep_largest(known: &mut BTreeMap<String, f64>, figures: &BTreeMap<String, f64>) {
+    for (name, &figure) in figures {
+        let largest = known.entry(name.clone()).or_insert(figure);
+        *largest = largest.max(figure);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_largest_figures_of_a_program_are_kept() {
+        let of = |figures: &[(&str, f64)]| figures.iter().map(|&(name, x)| (name.to_owned(), x)).collect();
+        let mut known = of(&[("VGPRs", 40.0), ("Code size", 900.0)]);
+        keep_largest(&mut known, &of(&[("VGPRs", 64.0), ("Code size", 800.0), ("Spilled VGPRs", 0.0)]));
+        assert_eq!(known, of(&[("VGPRs", 64.0), ("Code size", 900.0), ("Spilled VGPRs", 0.0)]));
+    }
 
     #[test]
     fn small_pictures_are_means() {
