@@ -160,17 +160,19 @@ fn work_is_counted_exactly() {
     let gpu = Gpu::open();
     let scene = scene();
     let rays = rays(5000, 6.0);
-    let mut tracer = Tracer::new(&gpu.device, &scene, Some(Traversal::Links16)).expect("a tracer");
-    let mut count = |rays: &[Ray], pairs: bool| {
-        let (_, work, _) = tracer.trace(rays, Mode { count: true, pairs, any_hit: false }, 1).expect("hits");
-        (work.node_visits[0], work.triangle_tests[0])
-    };
-    let whole = count(&rays, false);
-    assert!(whole.0 > 20_000 && whole.1 > 2_000, "{whole:?}");
-    assert_eq!(whole, count(&rays, false));
-    assert_eq!(whole, count(&rays, true));
-    let parts = rays.chunks(777).map(|part| count(part, false)).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
-    assert_eq!(whole, parts);
+    for way in [Traversal::Links16, Traversal::Stack] {
+        let mut tracer = Tracer::new(&gpu.device, &scene, Some(way)).expect("a tracer");
+        let mut count = |rays: &[Ray], pairs: bool| {
+            let (_, work, _) = tracer.trace(rays, Mode { count: true, pairs, any_hit: false }, 1).expect("hits");
+            (work.node_visits[0], work.triangle_tests[0])
+        };
+        let whole = count(&rays, false);
+        assert!(whole.0 > 20_000 && whole.1 > 2_000, "{way:?}: {whole:?}");
+        assert_eq!(whole, count(&rays, false), "{way:?}");
+        assert_eq!(whole, count(&rays, true), "{way:?}");
+        let parts = rays.chunks(777).map(|part| count(part, false)).fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        assert_eq!(whole, parts, "{way:?}");
+    }
 }
 
 /// Points on every triangle, an eighth each on edges and in corners, and directions away from it: outwards as steep as
