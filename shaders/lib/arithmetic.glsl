@@ -360,7 +360,7 @@ vec2 cos_sin_of_turns(float turns) {
     return r;
 }
 
-// Vulkan says nothing about its cosine of more than half a turn.
+// cos 2π·turns. The fast tier reduces the angle as well: beyond half a turn Vulkan bounds no error of its cosine.
 float cos_of_turns(float turns) {
     return cos_sin_of_turns(ARITHMETIC == FAST ? turns - floor(turns + 0.5) : turns).x;
 }

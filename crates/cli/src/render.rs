@@ -53,23 +53,23 @@ impl Phases {
 /// # Errors
 /// One sentence with the action, its object and the cause.
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
-    let mut written = BTreeSet::new();
-    match draw_any(args, quiet, &mut written) {
+    let mut printed = BTreeSet::new();
+    match draw_any(args, quiet, &mut printed) {
         Err(error) if is_lost(&error) => {
             // Frames whose files are complete are not drawn again.
             let what = if args.sequence.is_sequence() { "what is missing" } else { "the picture" };
             tracing::warn!("{error:#}; {what} is drawn once more, in short submissions");
             let device = DeviceOptions { short_submissions: true, ..args.device.clone() };
-            draw_any(&RenderArgs { device, ..args.clone() }, quiet, &mut written)
+            draw_any(&RenderArgs { device, ..args.clone() }, quiet, &mut printed)
         }
         drawn => drawn,
     }
 }
 
-/// Draws a sequence, a part or a picture. `written` has the frames that this command has told to be there.
-fn draw_any(args: &RenderArgs, quiet: bool, written: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
+/// Draws a sequence, a part or a picture. `printed` holds the frames whose paths this command has printed.
+fn draw_any(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
     if args.sequence.is_sequence() {
-        return sequence::run(args, quiet, written);
+        return sequence::run(args, quiet, printed);
     }
     match args.sequence.shard {
         Some(part) => shard::run(args, part, quiet),

@@ -217,7 +217,7 @@ fn holds(path: &Path, format: Format, picture: &str) -> Option<(Vec<u8>, Option<
 ///
 /// # Errors
 /// One sentence with the action, its object and the cause; an error of a picture also names its frame.
-pub fn run(args: &RenderArgs, quiet: bool, written: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
+pub fn run(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
     let begun = Instant::now();
     let mut settings = args.render_settings()?;
     usage(check_halves(&args.aov, &settings))?;
@@ -261,7 +261,7 @@ pub fn run(args: &RenderArgs, quiet: bool, written: &mut BTreeSet<PathBuf>) -> R
     settings.exposure = exposure.stops;
     [Some(&lit_by.sentence), exposure.sentence.as_ref()].into_iter().flatten().for_each(|line| steps.tell(line));
     let (_, settings) = opened.lit(settings);
-    let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings, written };
+    let mut drawer = Drawer { args, device: &device, renderer: None, moved: true, settings, printed };
     let mut pictures: Vec<PictureRecord> = Vec::new();
     let mut shown: Vec<Display> = Vec::new();
     let of = (wanted.frames.len() * fixed.len()).max(1) as f64;
@@ -331,9 +331,9 @@ pub fn run(args: &RenderArgs, quiet: bool, written: &mut BTreeSet<PathBuf>) -> R
     Ok(ExitCode::SUCCESS)
 }
 
-/// Prints the path of a file that is there; whether it is told for the first time.
-fn tell(path: &Path, written: &mut BTreeSet<PathBuf>) -> Result<bool> {
-    let is_new = written.insert(path.to_owned());
+/// Prints the path of a written file unless `printed` has it. Returns whether it was printed.
+fn print_once(path: &Path, printed: &mut BTreeSet<PathBuf>) -> Result<bool> {
+    let is_new = printed.insert(path.to_owned());
     if is_new {
         print(&path.display().to_string())?;
     }
@@ -348,8 +348,8 @@ struct Drawer<'a> {
     /// Whether the scene has changed since the renderer was made.
     moved: bool,
     settings: Settings,
-    /// Files that were told: a command that lost its device finds them again.
-    written: &'a mut BTreeSet<PathBuf>,
+    /// Files whose paths this command has printed. A command that lost its device finds them again.
+    printed: &'a mut BTreeSet<PathBuf>,
 }
 
 impl Drawer<'_> {
@@ -386,7 +386,7 @@ impl Drawer<'_> {
             for ((path, _), (bytes, shown)) in files.iter().zip(found) {
                 display = display.or(shown);
                 told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
-                told.found &= tell(path, self.written)?;
+                told.found &= print_once(path, self.printed)?;
             }
             return Ok((told, display));
         }
@@ -423,7 +423,7 @@ impl Drawer<'_> {
             };
             file::write(path, &bytes)?;
             told.outputs.push(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
-            tell(path, self.written)?;
+            print_once(path, self.printed)?;
         }
         told.write_ms = writing.elapsed().as_secs_f64() * 1e3;
         let [width, height] = self.settings.size;

@@ -42,6 +42,13 @@ impl<'a> Masked<'a> {
     }
 }
 
+/// Asserts that two pictures have the same radiance in every pixel.
+#[track_caller]
+fn assert_same_radiance(folder: &Path, [a, b]: [&str; 2], what: &str) {
+    let diff = etalon(folder, &["diff", "--metric", "mae", a, b], &[]).succeeded();
+    assert_eq!(diff.stdout, "mae 0\n", "{what}");
+}
+
 /// Shadow maps; paths past textures. Nothing that fragments see is textured: lavapipe 22.3 chooses other mip levels
 /// where places of textures lie in storage buffers (docs/decisions/helper-invocations.md).
 const PICTURES: [[&str; 3]; 2] = [["study:cornell", "--model", "local"], ["study:metals", "--model", "global"]];
@@ -61,8 +68,11 @@ fn a_device_that_can_draw_draws_the_same_bits() {
             }
             let masked = Masked::new(folder.path(), &file);
             masked.run(&render(picture, "there.exr")).succeeded();
-            let diff = etalon(folder.path(), &["diff", "--metric", "mae", "here.exr", "there.exr"], &[]).succeeded();
-            assert_eq!(diff.stdout, "mae 0\n", "{}: {picture:?}", description.name);
+            assert_same_radiance(
+                folder.path(),
+                ["here.exr", "there.exr"],
+                &format!("{}: {picture:?}", description.name),
+            );
         }
     }
 }
@@ -141,8 +151,7 @@ fn a_lost_device_is_tried_once_more_in_short_submissions() {
         let fault = format!("{{ \"lost_at_submission\": {lost} }}");
         let run = with_fault(folder.path(), &fault, &render("again.exr")).succeeded();
         assert!(run.stderr.contains("once more, in short submissions"), "{lost}: {run:?}");
-        let diff = etalon(folder.path(), &["diff", "--metric", "mae", "whole.exr", "again.exr"], &[]).succeeded();
-        assert_eq!(diff.stdout, "mae 0\n", "lost at {lost}");
+        assert_same_radiance(folder.path(), ["whole.exr", "again.exr"], &format!("lost at {lost}"));
     }
 }
 
@@ -171,8 +180,7 @@ fn sequences_and_parts_are_tried_once_more_too() {
     let run = with_fault(folder, r#"{ "lost_at_submission": 4 }"#, &part("again.exr")).succeeded();
     assert!(run.stderr.contains("the picture is drawn once more, in short submissions"), "{run:?}");
     // The header names the worker and its time.
-    let diff = etalon(folder, &["diff", "--metric", "mae", "whole.exr", "again.exr"], &[]).succeeded();
-    assert_eq!(diff.stdout, "mae 0\n", "a part");
+    assert_same_radiance(folder, ["whole.exr", "again.exr"], "a part");
 }
 
 /// Short submissions are cut by their measured pace; a clock that stands still, or runs a million times too fast,
@@ -184,11 +192,10 @@ fn timestamps_may_be_wrong() {
     etalon(folder.path(), &render("here.exr"), &HASTY).succeeded();
     for factor in [0, 1_000_000] {
         // A lost device is what makes submissions short on a CPU.
-        let fault = format!("{{ \"timestamps_times\": {factor}, \"lost_at_submission\": 1 }}");
+        let fault = format!("{{ \"timestamp_factor\": {factor}, \"lost_at_submission\": 1 }}");
         let run = with_fault(folder.path(), &fault, &render("there.exr")).succeeded();
         assert!(run.stderr.contains("in short submissions"), "{run:?}");
-        let diff = etalon(folder.path(), &["diff", "--metric", "mae", "here.exr", "there.exr"], &[]).succeeded();
-        assert_eq!(diff.stdout, "mae 0\n", "times {factor}");
+        assert_same_radiance(folder.path(), ["here.exr", "there.exr"], &format!("times {factor}"));
     }
 }
 
@@ -216,9 +223,9 @@ fn rewritten_shaders_are_valid() {
             // Everything that can be switched on.
             let constants: Vec<(u32, u32)> = program.constants.iter().map(|constant| (constant.id, 1)).collect();
             let words = specialized(stage.words, &constants);
-            let in_order = reverses.rewritten(&words).is_some();
-            assert!(!in_order || program.stages.len() == 1, "{}: a raster stage has no workgroups", program.name);
-            reversed += usize::from(in_order);
+            let is_reversed = reverses.rewritten(&words).is_some();
+            assert!(!is_reversed || program.stages.len() == 1, "{}: a raster stage has no workgroups", program.name);
+            reversed += usize::from(is_reversed);
             let Some(words) = all.rewritten(&words) else { continue };
             checked += 1;
             if !has_validator {
@@ -397,9 +404,7 @@ fn neither_old_memory_nor_order_nor_the_width_of_vectors_is_seen() {
         let render = |to: &'static str| ["render", scene, "--model", model, "--size", "48x27", "-o", to];
         etalon(folder.path(), &render("usual.exr"), &HASTY).succeeded();
         let same = |what: &str| {
-            let arguments = ["diff", "--metric", "mae", "usual.exr", "other.exr"];
-            let diff = etalon(folder.path(), &arguments, &[]).succeeded();
-            assert_eq!(diff.stdout, "mae 0\n", "{scene}, {model}: {what}");
+            assert_same_radiance(folder.path(), ["usual.exr", "other.exr"], &format!("{scene}, {model}: {what}"));
         };
         with_fault(folder.path(), "{ \"dirty_memory\": true }", &render("other.exr")).succeeded();
         same("dirty memory");

@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use crate::arithmetic::Inexact;
 use crate::contraction::contracted;
-use crate::order::reordered;
+use crate::order::reversed;
 
 /// Environment variable with the path of the description file.
 pub(crate) const VARIABLE: &str = "ETALON_MASK";
@@ -48,7 +48,7 @@ pub struct Description {
     /// sees.
     pub dirty_memory: bool,
     /// Factor of all timestamps: 0 for a clock that stands still, or much for one that runs too fast.
-    pub timestamps_times: Option<u64>,
+    pub timestamp_factor: Option<u64>,
     /// What asking for a window's next picture comes to, in turns. Each fault is noted in the file `NAME.noted` beside
     /// the description.
     pub(crate) acquire: Vec<Acquired>,
@@ -128,7 +128,7 @@ impl From<MailedPassport> for Description {
             reverses: false,
             lost_at_submission: None,
             no_memory_from_allocation: None,
-            timestamps_times: None,
+            timestamp_factor: None,
             acquire: Vec::new(),
             keeps_pipelines: false,
             refused: Vec::new(),
@@ -172,8 +172,8 @@ impl Description {
     pub fn rewritten(&self, words: &[u32]) -> Option<Vec<u32>> {
         let inexact = self.inexact.rewritten(words);
         let contracted = self.contracts.then(|| contracted(inexact.as_deref().unwrap_or(words))).flatten().or(inexact);
-        let reordered = self.reverses.then(|| reordered(contracted.as_deref().unwrap_or(words))).flatten();
-        reordered.or(contracted)
+        let reversed = self.reverses.then(|| reversed(contracted.as_deref().unwrap_or(words))).flatten();
+        reversed.or(contracted)
     }
 
     /// What the nth request for a window's picture comes to, in place of the picture.

@@ -562,7 +562,7 @@ unsafe extern "system" fn query_results(
     unsafe {
         let answer = (device_below().query_results)(device, pool, first, count, bytes, to, stride, flags);
         if let (Some(factor), true) =
-            (below().description.timestamps_times, flags.contains(vk::QueryResultFlags::TYPE_64))
+            (below().description.timestamp_factor, flags.contains(vk::QueryResultFlags::TYPE_64))
         {
             for query in 0..count as usize {
                 let ticks = to.cast::<u8>().add(query * stride as usize).cast::<u64>();

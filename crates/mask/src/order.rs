@@ -12,7 +12,7 @@ use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, Op, StorageClass, Word};
 use crate::rewrite::loaded;
 
 /// The module with workgroups in the reverse order; `None` if it is no module, or asks for no place in a dispatch.
-pub(crate) fn reordered(words: &[Word]) -> Option<Vec<Word>> {
+pub(crate) fn reversed(words: &[Word]) -> Option<Vec<Word>> {
     let (mut builder, modes) = loaded(words)?;
     let module = builder.module_ref();
     let variable_of = |wanted: BuiltIn| {
@@ -75,17 +75,17 @@ pub(crate) fn reordered(words: &[Word]) -> Option<Vec<Word>> {
     };
     let (count, group) = (write(&mut builder, Op::Load, &[count]), write(&mut builder, Op::Load, &[group]));
     let last = write(&mut builder, Op::ISub, &[count, one]);
-    let other_group = write(&mut builder, Op::ISub, &[last, group]);
+    let mirrored_group = write(&mut builder, Op::ISub, &[last, group]);
     let mut stored = Vec::new();
     if let Some((_, other)) = others[0] {
-        stored.push([other, other_group]);
+        stored.push([other, mirrored_group]);
     }
     if let Some((place, other)) = others[1] {
         let global = write(&mut builder, Op::Load, &[place]);
         let first = write(&mut builder, Op::IMul, &[group, size]);
         let local = write(&mut builder, Op::ISub, &[global, first]);
-        let other_first = write(&mut builder, Op::IMul, &[other_group, size]);
-        stored.push([other, write(&mut builder, Op::IAdd, &[other_first, local])]);
+        let mirrored_first = write(&mut builder, Op::IMul, &[mirrored_group, size]);
+        stored.push([other, write(&mut builder, Op::IAdd, &[mirrored_first, local])]);
     }
     prologue.extend(
         stored.into_iter().map(|operands| {

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 use etalon::frame::{Rendered, Settings};
-use etalon::gpu::{Device, DeviceChoice};
+use etalon::gpu::{Device, DeviceChoice, Program};
 use etalon::image::{Picture, file};
 use etalon::open::Opened;
 use etalon::plan::{Architecture, Knobs, Model};
+use etalon::shader::PROGRAMS;
 use etalon::upload::rays::Traversal;
 use serde::{Deserialize, Serialize};
 
@@ -64,8 +65,8 @@ pub struct Pictures {
     pub refused: Vec<String>,
     /// Other ways to draw a picture.
     pub ways: Vec<SamePicture>,
-    /// What the driver's compiler made of each stage of a program: the largest of each of its figures over all
-    /// pictures, by the driver's names. Empty where the driver tells nothing.
+    /// What the driver's compiler made of each stage of the renderer's programs: the largest of each of its figures
+    /// over all pictures, by the driver's names. Empty where the driver tells nothing.
     #[serde(default)]
     pub compiled: BTreeMap<String, BTreeMap<String, f64>>,
 }
@@ -191,7 +192,9 @@ pub fn measure(
         Err(error) if etalon::gpu::is_lost(&error) => return Err(error),
         Err(error) => pictures.refused.push(format!("{first} in several ways: {error:#}")),
     }
-    for (program, constants) in device.pipelines() {
+    // The device has the programs of other sections too.
+    let of_renderer = |(program, _): &(&Program, Vec<(u32, u32)>)| PROGRAMS.contains(program);
+    for (program, constants) in device.pipelines().into_iter().filter(of_renderer) {
         for compiled in device.compiled(program, &constants)? {
             let known = pictures.compiled.entry(format!("{} {}", program.name, compiled.stage)).or_default();
             keep_largest(known, &compiled.figures);
