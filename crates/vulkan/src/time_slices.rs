@@ -26,8 +26,10 @@ use super::sync::Barrier;
 
 /// Most milliseconds that a submission of whole passes may take.
 const LONGEST_MS: f64 = 200.0;
-/// The first piece of a dispatch with unknown time per group is 1/32 of it.
+/// The first piece of a dispatch with unknown time per group is 1/32 of it, and at most 64 groups, each of which then
+/// has 3 ms before the piece takes longer than [`LONGEST_MS`].
 const FIRST: u64 = 32;
+const FIRST_MOST: u64 = 64;
 /// Largest ratio of the groups of a piece to those of the piece before, which may have been fast by chance.
 const GROWTH: f64 = 4.0;
 
@@ -331,7 +333,8 @@ impl Recording<'_> {
     ) -> Result<f64> {
         let all: u64 = groups.into_iter().map(u64::from).product();
         let slice_ms = self.device.time_slices.slice_ms.unwrap_or(LONGEST_MS);
-        let mut most = known.filter(|ms| *ms > 0.0).map_or(all.div_ceil(FIRST) as f64, |ms| slice_ms / ms);
+        let unknown = all.div_ceil(FIRST).min(FIRST_MOST) as f64;
+        let mut most = known.filter(|ms| *ms > 0.0).map_or(unknown, |ms| slice_ms / ms);
         let (mut done, mut total) = (0, 0.0);
         // A dispatch without groups is still submitted once, for its barriers.
         while done < all || done == 0 {
