@@ -13,7 +13,7 @@ use etalon::study::shape::Shape;
 use etalon::study::{self, generate};
 use etalon::upload::view::View;
 use etalon_testing::gpu::{Gpu, bits, knobs, largest_difference, settings};
-use etalon_testing::made::{Made, Random, at, lambert, unlit};
+use etalon_testing::made::{Made, SplitMix64, at, lambert, unlit};
 use glam::{DAffine3, DVec3, Vec3};
 
 const SIZE: [u32; 2] = [64, 36];
@@ -155,7 +155,7 @@ fn a_spot_has_a_squared_ramp_between_its_cones() {
 fn lit_scene(count: usize) -> Scene {
     let mut scene = study::load("lamps").expect("a study scene");
     scene.lights.clear();
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     let mut made = Made(scene);
     for i in 0..count {
         let color = [0, 1, 2].map(|_| random.between(0.2, 3.0) as f32);
@@ -265,7 +265,7 @@ fn more_lights_than_a_loop_can_run_over_are_refused() {
     let gpu = Gpu::open();
     let with = |count: u32| {
         let mut made = wall([0.5; 3]);
-        let mut random = Random(4);
+        let mut random = SplitMix64::new(4);
         for i in 0..count {
             let position = DVec3::new(random.between(-2.0, 2.0), random.between(-1.0, 1.0), random.between(0.5, 3.0));
             // The last one is as strong as all before it.

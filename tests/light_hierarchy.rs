@@ -14,7 +14,7 @@ use etalon::study::shape::Shape;
 use etalon::transport::emitters::{EmitterSource, Emitters};
 use etalon::transport::light_hierarchy::LightHierarchy;
 use etalon_testing::gpu::{Gpu, bits, spread};
-use etalon_testing::made::{Made, Random, at, lambert, orthographic};
+use etalon_testing::made::{Made, SplitMix64, at, lambert, orthographic};
 use etalon_testing::probe::evaluate;
 use glam::{DAffine3, DVec3};
 
@@ -34,7 +34,7 @@ fn floor() -> Made {
 }
 
 /// Somewhere over the floor.
-fn over(random: &mut Random) -> DVec3 {
+fn over(random: &mut SplitMix64) -> DVec3 {
     let [x, z] = [(); 2].map(|()| random.between(-18.0, 18.0));
     DVec3::new(x, random.between(0.4, 1.6), z)
 }
@@ -42,7 +42,7 @@ fn over(random: &mut Random) -> DVec3 {
 /// Point lights of several intensities over the floor.
 fn points(count: usize) -> Made {
     let mut made = floor();
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     for _ in 0..count {
         let position = over(&mut random);
         made.light([random.between(0.5, 2.0) as f32; 3], LightKind::Point { position, range: None });
@@ -53,7 +53,7 @@ fn points(count: usize) -> Made {
 /// Small panels that emit downwards, upwards or on both sides, half of them in mirrored instances.
 fn panels(count: usize) -> Made {
     let mut made = floor();
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     let lamp = |double_sided| Material { emissive: [20.0; 3], double_sided, ..lambert([0.0; 3]) };
     let meshes = [false, true].map(|double_sided| made.mesh(Shape::panel(0.2, 0.2), lamp(double_sided)));
     for i in 0..count {
@@ -74,7 +74,7 @@ fn kinds() -> Made {
     let mut made = panels(6);
     let glow = Material { emissive: [20.0; 3], ..lambert([0.0; 3]) };
     made.add(Shape::panel(1.0, 1.0), glow, at(9.0, 1.0, 9.0) * DAffine3::from_scale(DVec3::splat(1e-9)));
-    let mut random = Random(13);
+    let mut random = SplitMix64::new(13);
     let up_or_down = |i: usize| if i.is_multiple_of(2) { DVec3::NEG_Y } else { DVec3::Y };
     for i in 0..6 {
         let position = over(&mut random);
@@ -145,7 +145,7 @@ fn lights_up(scene: &Scene, source: EmitterSource, point: DVec3) -> bool {
 }
 
 fn places() -> Vec<DVec3> {
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let mut places: Vec<DVec3> =
         (0..60).map(|_| over(&mut random) * DVec3::new(1.2, random.between(-1.0, 2.0), 1.2)).collect();
     // On a light, and far away.

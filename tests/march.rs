@@ -13,7 +13,7 @@ use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, knobs, settings};
-use etalon_testing::made::{Made, Random, at, lambert, perspective, unlit};
+use etalon_testing::made::{Made, SplitMix64, at, lambert, perspective, unlit};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 fn marching(size: [u32; 2], more: &[&str]) -> Settings {
@@ -293,7 +293,7 @@ fn a_constant_grid_is_a_homogeneous_medium() {
 /// Bodies with rough grids of every kind: turned, mirrored, scaled unevenly; the last two are one mesh and one
 /// material.
 fn bodies(moved: DVec3) -> Vec<Body> {
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     let bounds = [DVec3::new(-0.4, -0.3, -0.5), DVec3::new(0.3, 0.4, 0.25)];
     let grids = [([3, 4, 5], 3), ([6, 1, 2], 1), ([2, 3, 2], 3)]
         .map(|(size, channels)| filled(size, bounds, channels, |_, _| random.between(0.0, 1.5)));
@@ -394,7 +394,7 @@ fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
     let gpu = Gpu::open();
     let size = [96, 54];
     let bounds = [DVec3::splat(-0.2), DVec3::splat(0.2)];
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     // Three bodies in a row: six surfaces, more than one traversal takes along. The light of the last picture is in
     // one.
     let row: Vec<Body> = [0.35, 0.85, 1.4]
@@ -472,7 +472,7 @@ fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
 fn light_reaches_into_a_mesh_through_its_grid() {
     let gpu = Gpu::open();
     let size = [64, 48];
-    let mut random = Random(9);
+    let mut random = SplitMix64::new(9);
     let bounds = [DVec3::splat(-0.8), DVec3::splat(0.8)];
     let grid = filled([3, 4, 3], bounds, 3, |_, _| random.between(0.1, 0.9));
     let body = Body { edges: DVec3::splat(1.6), frame: DAffine3::IDENTITY, grid, bounds };

@@ -5,7 +5,7 @@ use etalon::scene::{LightKind, Scene};
 use etalon::study;
 use etalon::study::generate::{self, at_scale};
 use etalon_testing::gpu::{Gpu, bits, settings};
-use etalon_testing::made::Random;
+use etalon_testing::made::SplitMix64;
 use glam::{DAffine3, DVec3};
 
 const SIZE: [u32; 2] = [96, 54];
@@ -78,7 +78,7 @@ fn the_order_of_triangles_and_of_their_corners_does_not_show() {
     for scene in scenes() {
         let here = gpu.film(&scene, settings(SIZE));
         let mut shuffled = scene.clone();
-        let mut random = Random(1);
+        let mut random = SplitMix64::new(1);
         for mesh in &mut shuffled.meshes {
             let mut triangles: Vec<[u32; 3]> = mesh.indices.as_chunks::<3>().0.to_vec();
             random.shuffle(&mut triangles);

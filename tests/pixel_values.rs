@@ -8,6 +8,7 @@
 use std::path::Path;
 
 use etalon::frame::{Renderer, Settings};
+use etalon::optics::SplitMix64;
 use etalon::optics::fresnel::{fresnel_dielectric, schlick};
 use etalon::plan::is_transparent;
 use etalon::prepare::Original;
@@ -26,32 +27,13 @@ const PIXELS: usize = 10;
 /// Width of a pixel in texels of the finest texture.
 const PIXEL: f64 = 0.25;
 
-/// Uniform random numbers (splitmix64).
-struct Random(u64);
+fn coin(random: &mut SplitMix64) -> bool {
+    random.below(2) == 0
+}
 
-impl Random {
-    fn word(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn within(&mut self, least: f64, most: f64) -> f64 {
-        least + (most - least) * (self.word() >> 11) as f64 / 9_007_199_254_740_992.0
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.word() % count as u64) as usize
-    }
-
-    fn coin(&mut self) -> bool {
-        self.below(2) == 0
-    }
-
-    fn list(&mut self, count: usize, least: f64, most: f64) -> Vec<f32> {
-        (0..count).map(|_| self.within(least, most) as f32).collect()
-    }
+/// Uniform numbers in [`least`, `most`).
+fn list(random: &mut SplitMix64, count: usize, least: f64, most: f64) -> Vec<f32> {
+    (0..count).map(|_| random.between(least, most) as f32).collect()
 }
 
 /// A value at a point: as looked up, and how far it would be off by one texel.
@@ -254,7 +236,7 @@ fn drawn<'e>(events: &'e [Event], hit: &Hit) -> Option<(usize, &'e Interaction)>
 }
 
 /// Compares [`PIXELS`] pixels that look at random points from the side of `above`.
-fn compare(stage: &mut Stage, random: &mut Random, above: Option<DVec3>, name: &str) -> Worst {
+fn compare(stage: &mut Stage, random: &mut SplitMix64, above: Option<DVec3>, name: &str) -> Worst {
     let Stage { scene, opaque, tracer, renderer } = stage;
     let bounds = scene.bounds().expect("bounds");
     let world = World::new(opaque, Options::default());
@@ -274,12 +256,13 @@ fn compare(stage: &mut Stage, random: &mut Random, above: Option<DVec3>, name: &
         }
         let (instance, triangle) = triangles[random.below(triangles.len())];
         let mesh = &opaque.meshes[opaque.instances[instance].mesh];
-        let (x, y) = (random.within(0.0, 1.0).sqrt(), random.within(0.0, 1.0));
+        let (x, y) = (random.between(0.0, 1.0).sqrt(), random.between(0.0, 1.0));
         let target = [1.0 - x, x * (1.0 - y), x * y].into_iter().enumerate().fold(DVec3::ZERO, |sum, (k, weight)| {
             let p = Vec3::from(mesh.positions[mesh.indices[3 * triangle + k] as usize]).as_dvec3();
             sum + opaque.instances[instance].world_from_object.transform_point3(p) * weight
         });
-        let way = DVec3::new(random.within(-1.0, 1.0), random.within(-1.0, 1.0), random.within(-1.0, 1.0)).normalize();
+        let way =
+            DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0)).normalize();
         let way = above.map_or(way, |above| (above + 0.7 * way).normalize());
         let eye = bounds.center() + way * 3.0 * bounds.radius();
         let up = way.any_orthonormal_vector();
@@ -396,10 +379,10 @@ fn check(worst: &mut Worst, scene: &Scene, hit: &Hit, found: &Interaction, p: &A
 }
 
 /// A picture of random bytes in the given ranges.
-fn picture(random: &mut Random, ranges: [[f64; 2]; 4]) -> Vec<u8> {
+fn picture(random: &mut SplitMix64, ranges: [[f64; 2]; 4]) -> Vec<u8> {
     let (width, height) = (3 + random.below(10) as u32, 2 + random.below(9) as u32);
     let bytes =
-        (0..width * height).flat_map(|_| ranges.map(|[least, most]| random.within(least, most) as u8)).collect();
+        (0..width * height).flat_map(|_| ranges.map(|[least, most]| random.between(least, most) as u8)).collect();
     let mut out = std::io::Cursor::new(Vec::new());
     let image = image::RgbaImage::from_raw(width, height, bytes).expect("its size");
     image.write_to(&mut out, image::ImageFormat::Png).expect("a picture");
@@ -407,18 +390,18 @@ fn picture(random: &mut Random, ranges: [[f64; 2]; 4]) -> Vec<u8> {
 }
 
 /// A new texture as a glTF textureInfo, of one of two sets of coordinates and with a transform.
-fn texture(builder: &mut Builder, random: &mut Random, ranges: [[f64; 2]; 4]) -> Value {
+fn texture(builder: &mut Builder, random: &mut SplitMix64, ranges: [[f64; 2]; 4]) -> Value {
     let view = builder.view(&picture(random, ranges), None);
     let source = builder.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
     let wraps = [10497, 33648, 33071];
-    let filter = if random.coin() { 9728 } else { 9729 };
+    let filter = if coin(random) { 9728 } else { 9729 };
     let sampler = json!({
         "magFilter": filter, "minFilter": filter, "wrapS": wraps[random.below(3)], "wrapT": wraps[random.below(3)],
     });
     let sampler = builder.push("samplers", sampler);
     let index = builder.push("textures", json!({ "source": source, "sampler": sampler }));
     let transform = json!({
-        "offset": random.list(2, -1.0, 1.0), "rotation": random.within(-3.0, 3.0), "scale": random.list(2, -1.5, 1.5),
+        "offset": list(random, 2, -1.0, 1.0), "rotation": random.between(-3.0, 3.0), "scale": list(random, 2, -1.5, 1.5),
     });
     let mut info = json!({ "index": index, "texCoord": random.below(2) });
     if random.below(4) > 0 {
@@ -434,12 +417,12 @@ const BUMPS: [[f64; 2]; 4] = [[90.0, 166.0], [90.0, 166.0], [200.0, 256.0], [255
 const COVERED: [[f64; 2]; 4] = [[0.0, 256.0], [0.0, 256.0], [0.0, 256.0], [200.0, 256.0]];
 
 /// A material with random factors and textures in all slots.
-fn material(builder: &mut Builder, random: &mut Random, number: u64) -> Value {
+fn material(builder: &mut Builder, random: &mut SplitMix64, number: u64) -> Value {
     let mut textures = |ranges| texture(builder, random, ranges);
     let [base, surface, mut normal, emissive, specular, specular_color, coat, coat_roughness, sheen, film, through] =
         [COVERED, ANY, BUMPS, ANY, ANY, ANY, ANY, ANY, ANY, ANY, ANY].map(&mut textures);
-    normal["scale"] = random.within(-1.5, 1.5).into();
-    let mut factors = |count, least, most| random.list(count, least, most);
+    normal["scale"] = random.between(-1.5, 1.5).into();
+    let mut factors = |count, least, most| list(random, count, least, most);
     let mut extensions = json!({
         "KHR_materials_emissive_strength": { "emissiveStrength": factors(1, 0.5, 3.0)[0] },
     });
@@ -489,7 +472,7 @@ fn material(builder: &mut Builder, random: &mut Random, number: u64) -> Value {
 }
 
 /// A patch of `side` by `side` squares over the unit square, with random heights, normals, coordinates and colours.
-fn patch(builder: &mut Builder, random: &mut Random, side: usize, height: f64, tangents: bool) -> Value {
+fn patch(builder: &mut Builder, random: &mut SplitMix64, side: usize, height: f64, tangents: bool) -> Value {
     let count = (side + 1).pow(2);
     let place = |i: usize| [i % (side + 1), i / (side + 1)].map(|x| x as f64 / side as f64);
     let mut floats = |shape, width: usize, mut value: Box<dyn FnMut(usize) -> Vec<f64> + '_>| {
@@ -497,7 +480,7 @@ fn patch(builder: &mut Builder, random: &mut Random, side: usize, height: f64, t
         assert_eq!(all.len(), width * count);
         builder.floats(shape, &all)
     };
-    let mut spread = |spread: f64| random.within(-spread, spread);
+    let mut spread = |spread: f64| random.between(-spread, spread);
     let positions = floats(
         "VEC3",
         3,
@@ -538,7 +521,7 @@ fn patch(builder: &mut Builder, random: &mut Random, side: usize, height: f64, t
 
 /// A model with random textures, and the direction from which its patch is seen.
 fn random_model(number: u64) -> (Scene, DVec3) {
-    let random = &mut Random(1000 + number);
+    let random = &mut SplitMix64::new(1000 + number);
     let mut builder = Builder::new();
     builder.json["extensionsUsed"] = json!([
         "KHR_texture_transform",
@@ -552,12 +535,12 @@ fn random_model(number: u64) -> (Scene, DVec3) {
     ]);
     let turn = DQuat::from_euler(
         glam::EulerRot::XYZ,
-        random.within(-3.0, 3.0),
-        random.within(-3.0, 3.0),
-        random.within(-3.0, 3.0),
+        random.between(-3.0, 3.0),
+        random.between(-3.0, 3.0),
+        random.between(-3.0, 3.0),
     );
     let mirror = if number % 2 == 1 { -1.0 } else { 1.0 };
-    let scale = [mirror * random.within(0.5, 2.0), random.within(0.5, 2.0), random.within(0.5, 2.0)];
+    let scale = [mirror * random.between(0.5, 2.0), random.between(0.5, 2.0), random.between(0.5, 2.0)];
     let mut blended = vec![(0.0, false)];
     if number % 5 < 2 {
         blended.push((0.4, true));
@@ -588,7 +571,7 @@ fn a_picked_pixel_of_random_models_has_the_values_of_the_g_buffer_and_of_a_looku
     let (mut textured, mut behind, mut mixtures) = (0, 0, 0);
     for number in 0..10 {
         let (scene, above) = random_model(number);
-        let random = &mut Random(number);
+        let random = &mut SplitMix64::new(number);
         let worst = compare(&mut stage(&gpu, scene), random, Some(above), &format!("model {number}"));
         textured += worst.textured;
         behind += worst.behind;
@@ -627,6 +610,6 @@ fn a_picked_pixel_of_real_models_has_the_values_of_the_g_buffer_and_of_a_lookup(
         let is_scene = |path: &std::path::PathBuf| path.extension().is_some_and(|e| e == "glb" || e == "gltf");
         let file = files.map(|entry| entry.expect("an entry").path()).find(is_scene).expect("a scene");
         let scene = load(&file, &LoadOptions::default()).expect("a scene");
-        compare(&mut stage(&gpu, scene), &mut Random(number as u64), None, name);
+        compare(&mut stage(&gpu, scene), &mut SplitMix64::new(number as u64), None, name);
     }
 }

@@ -18,7 +18,7 @@ use etalon::scene::{AlphaMode, AmbientLight, Camera, Image, LightKind, Material,
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, bits};
-use etalon_testing::made::{Made, Random, at, lambert, orthographic, perspective, unlit};
+use etalon_testing::made::{Made, SplitMix64, at, lambert, orthographic, perspective, unlit};
 use glam::DVec3;
 
 const SIZE: [u32; 2] = [16, 16];
@@ -168,7 +168,7 @@ fn spread() -> &'static [(Ways, Choice)] {
 }
 
 fn chosen() -> Vec<(Ways, Choice)> {
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     let mut seen = BTreeSet::new();
     let mut all = Vec::new();
     for ways in all_ways() {

@@ -3,6 +3,7 @@
 
 use std::{fs, panic::AssertUnwindSafe, path::Path};
 
+use etalon::optics::SplitMix64;
 use etalon::scene::{self, LoadOptions};
 use etalon_testing::gltf_builder::{Builder, FLOAT, UNSIGNED_BYTE, UNSIGNED_INT, f32s, png, u16s};
 use serde_json::{Value, json};
@@ -73,22 +74,6 @@ fn rich() -> Builder {
     b
 }
 
-/// A stream of numbers that is the same every time (SplitMix64).
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.next() % n as u64) as usize
-    }
-}
-
 /// Loads and reports a panic with the seed that led to it; any other outcome will do.
 fn survives(path: &Path, seed: u64) -> bool {
     let load = || {
@@ -118,14 +103,14 @@ fn flipped_and_missing_bytes_never_panic() {
     let sound = rich().glb();
     let mut read = 0;
     for seed in 0..2000 {
-        let mut numbers = Numbers(seed);
+        let mut numbers = SplitMix64::new(seed);
         let mut bytes = sound.clone();
         for _ in 0..1 + numbers.below(4) {
             let at = numbers.below(bytes.len());
             bytes[at] = match numbers.below(3) {
                 0 => bytes[at] ^ 1 << numbers.below(8),
                 1 => b'0' + numbers.below(10) as u8,
-                _ => numbers.next() as u8,
+                _ => numbers.bits() as u8,
             };
         }
         if numbers.below(8) == 0 {
@@ -144,7 +129,7 @@ fn flipped_and_missing_bytes_never_panic() {
 }
 
 /// Puts an odd value somewhere into a JSON document.
-fn mutate(value: &mut Value, numbers: &mut Numbers) {
+fn mutate(value: &mut Value, numbers: &mut SplitMix64) {
     let odd = || {
         vec![
             json!(0),
@@ -197,7 +182,7 @@ fn odd_values_in_the_json_never_panic() {
     let sound = rich();
     let mut read = 0;
     for seed in 0..3000 {
-        let mut numbers = Numbers(seed ^ 0x5eed);
+        let mut numbers = SplitMix64::new(seed ^ 0x5eed);
         let mut b = sound.clone();
         b.json["buffers"] = json!([{ "byteLength": b.bytes.len() }]);
         for _ in 0..1 + numbers.below(3) {
@@ -220,7 +205,7 @@ fn mutated_wavefront_files_never_panic() {
     let path = folder.path().join("a.obj");
     let alphabet = b"0123456789 -/.\n#\\vtfnlpo\xff\te";
     for seed in 0..2000 {
-        let mut numbers = Numbers(seed ^ 0x0b1);
+        let mut numbers = SplitMix64::new(seed ^ 0x0b1);
         let mut texts = [obj.as_bytes().to_vec(), mtl.as_bytes().to_vec()];
         for _ in 0..1 + numbers.below(3) {
             let text = &mut texts[numbers.below(2)];

@@ -1,6 +1,7 @@
 //! What is a solid, and which solids a point lies in: against closed forms.
 
 use etalon::frame::Settings;
+use etalon::optics::SplitMix64;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::Environment;
 use etalon::scene::solid::{Solids, deepest_nesting, is_closed, media_at, solids};
@@ -49,20 +50,9 @@ fn without_a_triangle(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// Numbers in 0 … 1, the same every time (SplitMix64).
-struct Numbers(u64);
-
-impl Numbers {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ z >> 31) >> 11) as f64 / 9_007_199_254_740_992.0
-    }
-
-    fn within(&mut self, reach: f64) -> DVec3 {
-        DVec3::new(self.unit(), self.unit(), self.unit()) * (2.0 * reach) - reach
-    }
+/// A uniform point in the cube from −`reach` to `reach`.
+fn within(random: &mut SplitMix64, reach: f64) -> DVec3 {
+    DVec3::from_array(std::array::from_fn(|_| random.between(-reach, reach)))
 }
 
 #[test]
@@ -255,14 +245,14 @@ fn placements_that_mirror_shear_and_stretch_agree_with_the_cube_they_place() {
         frame(DVec3::new(1.0, 5.0, 0.1), far) * DAffine3::from_rotation_z(0.7),
         frame(DVec3::new(-2.0, -1.0, -1.0), far) * DAffine3::from_rotation_x(-0.4),
     ];
-    let mut numbers = Numbers(4);
+    let mut numbers = SplitMix64::new(4);
     for frame in frames {
         for cube in [cube("cube", 1.0), turned(cube("turned cube", 1.0))] {
             let scene = scene_of(vec![(cube, frame)]);
             let found = solids(&scene);
             let mut inside = 0;
             for _ in 0..400 {
-                let p_object = numbers.within(0.75);
+                let p_object = within(&mut numbers, 0.75);
                 let distance = 0.5 - p_object.abs().max_element();
                 if distance.abs() < 1e-4 {
                     // Four thousand kilometres out f64 keeps nanometres; the stretches make that 1e-8 of the cube.

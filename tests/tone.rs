@@ -10,7 +10,7 @@ use etalon::pass::tonemap::{Counts, Display, tonemap};
 use etalon::scene::LightKind;
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, settings};
-use etalon_testing::made::{Made, Random, lambert, unlit};
+use etalon_testing::made::{Made, SplitMix64, lambert, unlit};
 use glam::{DAffine3, DVec3};
 
 const CURVES: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::KhronosNeutral];
@@ -71,14 +71,14 @@ fn a_device_that_runs_nothing_is_an_error() {
 #[test]
 fn every_curve_shows_the_bytes_of_its_twin() {
     let gpu = Gpu::open();
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     // Radiances from 2^-24 to 1e38 (2^126.2) in all colours: a third greys, the rest of any saturation, some channels
     // zero. Half of them stay below 2^16, where the curves still bend.
     let film: Vec<[f32; 4]> = (0..64 * 256)
         .map(|i| {
             let top = if i % 2 == 0 { 15.99 } else { 126.2 };
             let level = random.between(-24.0, top);
-            let channel = |r: &mut Random| match i % 3 {
+            let channel = |r: &mut SplitMix64| match i % 3 {
                 0 => level.exp2() as f32,
                 1 => (level + r.between(-3.0, 0.0)).exp2() as f32,
                 _ => (r.between(-24.0, top)).exp2() as f32 * (r.unit() > 0.1) as u32 as f32,
@@ -239,7 +239,7 @@ fn light_beyond_f32_is_counted_as_infinite() {
 #[test]
 fn what_lies_behind_is_what_the_twin_has_there() {
     let gpu = Gpu::open();
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     let film: Vec<[f32; 4]> = (0..64 * 16)
         .map(|i| {
             let alpha = [0.0, 1.0, random.between(0.0, 1.0)][i % 3];
@@ -262,7 +262,7 @@ fn what_lies_behind_is_what_the_twin_has_there() {
 #[test]
 fn colours_outside_of_the_gamut_keep_their_luminance() {
     let gpu = Gpu::open();
-    let mut random = Random(5);
+    let mut random = SplitMix64::new(5);
     let film: Vec<[f32; 4]> = (0..64 * 16)
         .map(|_| {
             let [r, g, b] = [0; 3].map(|_| random.between(-0.3, 0.9) as f32);

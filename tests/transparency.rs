@@ -7,7 +7,7 @@ use etalon::scene::{AlphaMode, Camera, Image, LightKind, Material, Sampler, Scen
 use etalon::study;
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, bits, knobs, settings};
-use etalon_testing::made::{Made, Random, at, lambert, pane, unlit};
+use etalon_testing::made::{Made, SplitMix64, at, lambert, pane, unlit};
 use glam::{Affine2, DAffine3, DVec3};
 
 const SIZE: [u32; 2] = [80, 45];
@@ -93,10 +93,10 @@ fn against_over(film: &Picture, scene: &Scene, slack: f64) -> (f64, usize) {
 }
 
 /// `count` panes at depths of their own, each somewhere else and turned, with the opacities that `alpha` gives.
-fn stack(count: usize, mut alpha: impl FnMut(&mut Random) -> f32) -> Scene {
+fn stack(count: usize, mut alpha: impl FnMut(&mut SplitMix64) -> f32) -> Scene {
     let mut made = Made::new("stack");
     made.add(Shape::panel(9.0, 5.0), unlit([0.25, 0.5, 0.75]), at(0.0, 0.0, -1.0));
-    let mut random = Random(3);
+    let mut random = SplitMix64::new(3);
     for i in 0..count {
         let color = [0, 1, 2].map(|_| random.unit() as f32);
         let alpha = alpha(&mut random);
@@ -109,7 +109,7 @@ fn stack(count: usize, mut alpha: impl FnMut(&mut Random) -> f32) -> Scene {
 }
 
 /// Opacities that a half float holds exactly.
-fn eighths(random: &mut Random) -> f32 {
+fn eighths(random: &mut SplitMix64) -> f32 {
     ((random.unit() * 7.0) as i32 + 1) as f32 / 8.0
 }
 
@@ -126,7 +126,7 @@ fn panes_in_any_order_are_composited_far_to_near() {
         assert!(left_out < 300, "{count} panes: {left_out}");
 
         let mut shuffled = scene.clone();
-        Random(count as u64).shuffle(&mut shuffled.instances);
+        SplitMix64::new(count as u64).shuffle(&mut shuffled.instances);
         let again = whole(&gpu, &shuffled, settings(SIZE));
         assert!(bits(&film) == bits(&again), "{count} panes: the order of drawing shows");
     }
@@ -308,7 +308,7 @@ fn lists_grow_and_split_until_everything_fits() {
         let shade = i as f32 / panes as f32;
         made.add(Shape::panel(9.0, 5.0), pane([shade, 1.0 - shade, 0.5], 0.125), at(0.0, 0.0, 0.01 * i as f64));
     }
-    Random(5).shuffle(&mut made.0.instances);
+    SplitMix64::new(5).shuffle(&mut made.0.instances);
     made.front(1.0);
     let (rendered, film) = gpu.shot(&made.0, None, settings(size));
     let want = over(&made.0, &made.0.cameras[0], size, 7, 11);

@@ -7,12 +7,12 @@ use etalon::study::shape::Shape;
 use etalon::transport::bvh::Bvh;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::Gpu;
-use etalon_testing::made::{Made, Random, at, lambert};
+use etalon_testing::made::{Made, SplitMix64, at, lambert};
 use glam::{DAffine3, DVec3, Vec3};
 
 const WAYS: [Traversal; 3] = [Traversal::Links16, Traversal::Links32, Traversal::Stack];
 
-fn direction(random: &mut Random) -> DVec3 {
+fn direction(random: &mut SplitMix64) -> DVec3 {
     let z = random.between(-1.0, 1.0);
     let turn = random.between(0.0, std::f64::consts::TAU);
     let r = (1.0 - z * z).sqrt();
@@ -26,7 +26,7 @@ fn vec(p: [f32; 3]) -> DVec3 {
 /// Balls, boxes, a soup of small triangles, and slivers as long as the scene, far from the origin. Rays meet the boxes
 /// of nearly all slivers, so more children wait than a short stack holds.
 fn scene() -> Scene {
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     let mut made = Made::new("traversal");
     let ball = made.mesh(Shape::sphere(0.5, 24), lambert([0.5; 3]));
     let cube = made.mesh(Shape::cuboid(DVec3::new(0.4, 1.7, 0.01)), lambert([0.5; 3]));
@@ -59,7 +59,7 @@ fn scene() -> Scene {
 
 /// Rays from everywhere around and inside, with lengths from 0.1 to 10 and some along the axes.
 fn rays(count: usize, reach: f64) -> Vec<Ray> {
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     (0..count)
         .map(|i| {
             let origin = direction(&mut random) * random.between(0.0, reach);
@@ -177,7 +177,7 @@ fn work_is_counted_exactly() {
 
 /// Points on every triangle, an eighth each on edges and in corners, and directions away from it: outwards as steep as
 /// it gets and down to 1e-6 above it, inwards to other faces. As the passes send them: from `ray_origin`.
-fn leaving(bvh: &Bvh, tracer: &Tracer, count: usize, outwards: bool, random: &mut Random) -> Vec<Ray> {
+fn leaving(bvh: &Bvh, tracer: &Tracer, count: usize, outwards: bool, random: &mut SplitMix64) -> Vec<Ray> {
     let offset = tracer.rays().offset();
     (0..count)
         .map(|i| {
@@ -258,7 +258,7 @@ fn rays_neither_hit_their_own_surface_nor_leak() {
             let bvh = Bvh::build(&made.0).expect("a tree");
             for way in [Traversal::Links16, Traversal::Stack] {
                 let mut tracer = Tracer::new(&gpu.device, &made.0, Some(way)).expect("a tracer");
-                let mut random = Random(3);
+                let mut random = SplitMix64::new(3);
                 let count = 50_000;
                 let out = leaving(&bvh, &tracer, count, true, &mut random);
                 let (hits, ..) = tracer.trace(&out, Mode::default(), 1).expect("hits");

@@ -19,6 +19,7 @@ use super::emitters::{Emitter, EmitterSource, Emitters};
 use super::layers::{Layer, Layers, Media, coverage};
 pub use super::layers::{SMOOTHEST, is_smooth};
 use super::line::{self, Crossing};
+use crate::optics::SplitMix64;
 use crate::scene::solid::Solids;
 use crate::scene::{Instance, Scene};
 use crate::share::GUIDING_COUNT_BITS;
@@ -100,23 +101,20 @@ struct PhotonWorld<'a> {
     radius: f64,
 }
 
-/// Uniform random numbers in [0, 1) (splitmix64; Steele, Lea and Flood 2014).
-pub(super) struct PhotonRandom(u64);
+/// Random numbers of photons.
+pub(super) struct PhotonRandom(SplitMix64);
 
 impl PhotonRandom {
     pub(super) fn new(number: u64) -> Self {
-        Self(number)
+        Self(SplitMix64::new(number))
     }
 
     pub(super) fn word(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
     pub(super) fn unit(&mut self) -> f64 {
-        (self.word() >> 11) as f64 / 9_007_199_254_740_992.0
+        self.0.unit()
     }
 
     /// A uniform point in the unit disk.

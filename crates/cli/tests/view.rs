@@ -20,7 +20,7 @@ use etalon::study;
 use etalon_mask::Mask;
 use etalon_testing::gltf_builder::{Builder, FLOAT, f32s};
 use etalon_testing::gpu::Gpu;
-use etalon_testing::made::Random;
+use etalon_testing::made::SplitMix64;
 use etalon_viewer::shared::{Loaded, OpenRequest, RenderRequest, RenderState, SceneSource, SharedState, Viewpoint};
 use etalon_viewer::worker::Worker;
 use serde_json::json;
@@ -100,7 +100,7 @@ fn the_window_shows_what_render_draws() {
     viewer.key(Z, Some(CONTROL));
     assert_eq!(shows_its_command(&mut viewer, folder), first, "taken back");
 
-    let mut random = Random(7);
+    let mut random = SplitMix64::new(7);
     for _ in 0..200 {
         viewer.resize([random.between(160.0, 500.0) as u32, random.between(120.0, 400.0) as u32]);
     }
@@ -606,7 +606,7 @@ fn many_interactions_leave_nothing_behind() {
     let arguments = ["study:cornell", "--size", "640x360", "--model", "local", "--set", "samples=1"];
     let mut viewer = Viewer::open(&display, folder, &arguments);
     shows_beside_panels_once(&mut viewer);
-    let mut random = Random(11);
+    let mut random = SplitMix64::new(11);
     let mut act = |viewer: &mut Viewer<'_>, count: usize| {
         let tabs = [[430, 35], [480, 35], [530, 35], [430, 200], [480, 200], [530, 200]];
         for i in 0..count {

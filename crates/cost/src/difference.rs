@@ -341,15 +341,13 @@ fn values(pixel: &[u8; 4]) -> [f32; 3] {
 mod tests {
     use super::*;
     use etalon::image::tone::{ToneMap, srgb_encode};
+    use etalon::optics::SplitMix64;
 
     const PLAIN: ViewTransform = ViewTransform { curve: ToneMap::Linear, exposure: 0.0, background: None };
 
-    /// Uniform random number in −1 … 1.
+    /// Uniform random number in [−1, 1).
     fn noise(index: usize) -> f32 {
-        let mut x = (index as u64).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((x ^ (x >> 31)) >> 40) as f32 / (1_u64 << 23) as f32 - 1.0
+        SplitMix64::new(index as u64).between(-1.0, 1.0) as f32
     }
 
     fn picture(value: impl Fn(usize) -> f32) -> Picture {

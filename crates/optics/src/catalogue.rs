@@ -177,6 +177,14 @@ impl SplitMix64 {
         if self.bits() & 1 == 0 { 1.0 } else { -1.0 }
     }
 
+    /// Fisher–Yates shuffle.
+    pub fn shuffle<T>(&mut self, all: &mut [T]) {
+        for i in (1..all.len()).rev() {
+            let j = self.below(i + 1);
+            all.swap(i, j);
+        }
+    }
+
     /// An integer in [0, count).
     pub fn below(&mut self, count: usize) -> usize {
         (self.unit() * count as f64) as usize

@@ -1,5 +1,6 @@
 //! Small scenes built in code.
 
+pub use etalon::optics::SplitMix64;
 use etalon::scene::{AlphaMode, Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DMat3, DVec3};
@@ -103,31 +104,4 @@ pub fn unlit(color: [f32; 3]) -> Material {
 pub fn pane(color: [f32; 3], alpha: f32) -> Material {
     let [r, g, b] = color;
     Material { base_color: [r, g, b, alpha], alpha_mode: AlphaMode::Blend, ..unlit(color) }
-}
-
-/// SplitMix64: uniform random numbers in [0, 1), the same sequence on every machine.
-pub struct Random(pub u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Uniform in [low, high).
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// Fisher–Yates shuffle.
-    pub fn shuffle<T>(&mut self, all: &mut [T]) {
-        for i in (1..all.len()).rev() {
-            let j = (self.unit() * (i + 1) as f64) as usize;
-            all.swap(i, j);
-        }
-    }
 }
