@@ -713,4 +713,6 @@ fn rungs_name_statements_that_there_are() {
         }
     }
     assert_eq!(etalon::lecture::statement("Z9"), None);
+    assert_eq!(etalon::lecture::functions("F5"), ["fresnel_dielectric", "refract"]);
+    assert!(etalon::lecture::functions("R5").is_empty(), "visibility is no formula");
 }

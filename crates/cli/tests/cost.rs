@@ -91,6 +91,10 @@ fn a_run_is_what_its_commands_draw() {
         let picture = format!("data-name=\"{}\"", point["picture"].as_str().expect("a name"));
         assert!(page.contains(&picture) || name == "reference", "{name}");
     }
+    // What a setting loses is told in words; noise of paths is no loss of a picture without paths.
+    let settings = page.split("id=\"trust\"").next().expect("a beginning");
+    assert!(settings.contains("you lose") && settings.contains("What you lose most by is"), "{settings:.2000}");
+    assert!(!settings.contains("<b>light-sampler="), "{settings:.2000}");
     let csv = std::fs::read_to_string(at.join("a/cost.csv")).expect("cost.csv");
     assert_eq!(csv.lines().count(), points.len() + 1);
 

@@ -1,12 +1,14 @@
 //! Results of a run of `etalon cost` as data: `cost.json` (schema `etalon.cost/1`) and `cost.csv`. See docs/cost.md.
 
 use std::collections::BTreeMap;
+use std::fmt::{self, Display, Formatter};
 
 use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::Interval;
 use etalon::gpu::Compiled;
+use etalon::plan::rungs::Indirect;
 use etalon::plan::{Knob, Knobs, Model};
 
 /// The document `cost.json`.
@@ -253,6 +255,12 @@ impl Point {
         self.errors.error.median
     }
 
+    /// Whether the picture is drawn by path tracing.
+    #[must_use]
+    pub fn is_path_traced(&self) -> bool {
+        self.rungs().is_ok_and(|knobs| knobs.indirect == Indirect::Path)
+    }
+
     /// The rungs as [`Knobs`].
     ///
     /// # Errors
@@ -364,8 +372,14 @@ impl Price {
     /// noise.
     #[must_use]
     pub fn is_seen(&self) -> bool {
-        let beyond_noise = self.base != Family::Exact || self.error_told;
-        !self.same && self.noise_ratio.is_none() && self.flip_between >= INVISIBLE && beyond_noise
+        self.noise_ratio.is_none() && self.shows()
+    }
+
+    /// Whether the change is visible, be it in noise alone. With base `exact` a difference of limits that is not
+    /// significant may be noise of other paths, and is not counted.
+    fn shows(&self) -> bool {
+        let beyond_noise = self.base != Family::Exact || self.error_told || self.noise_ratio.is_some();
+        !self.same && self.flip_between >= INVISIBLE && beyond_noise
     }
 }
 
@@ -398,18 +412,67 @@ pub struct Tried {
     pub kept: bool,
 }
 
+/// A knob of a point that is on another rung than in the reference.
+#[derive(Debug, Clone, Copy)]
+pub struct Simplified<'a> {
+    /// The knob.
+    pub knob: &'a KnobState,
+    /// Its rung in the point.
+    pub rung: &'a str,
+    /// FLIP error, 0 to 1, that the rung causes here: 0 if it is not visible, `None` if it was not measured.
+    pub seen: Option<f64>,
+}
+
+impl Simplified<'_> {
+    /// The rung's sentence: what it does, and what it loses.
+    #[must_use]
+    pub fn about(&self) -> &'static str {
+        let sentence = |knob: &'static Knob| {
+            let place = knob.rungs.iter().position(|rung| *rung == self.rung)?;
+            knob.rung_about.get(place).copied()
+        };
+        Knob::named(&self.knob.knob).and_then(sentence).unwrap_or_default()
+    }
+}
+
+impl Display for Simplified<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.knob.knob, self.rung)
+    }
+}
+
+/// Largest visible difference (FLIP) that was measured between a rung and a more exact one with all other knobs alike;
+/// 0 if none was visible, `None` if no such pair was drawn. Pairs with this base count. Where there are none, those
+/// with the other base do, but for pairs that differ in the noise of their paths alone.
+fn seen(prices: &[Price], knob: &str, rung: &str, base: Family) -> Option<f64> {
+    let cheaper = |price: &Price| if price.to_more_exact() { price.from == rung } else { price.to == rung };
+    let pairs = prices.iter().filter(|price| price.knob == knob && cheaper(price));
+    let (alike, others): (Vec<&Price>, Vec<&Price>) = pairs.partition(|price| price.base == base);
+    let others = others.into_iter().filter(|price| price.noise_ratio.is_none());
+    let counted = if alike.is_empty() { others.collect() } else { alike };
+    counted.iter().map(|price| if price.shows() { price.flip_between } else { 0.0 }).reduce(f64::max)
+}
+
 /// Name of the reference among the points.
 pub const REFERENCE: &str = "reference";
 
 impl Table {
     /// The simplified knobs of a point: those that the scene calls for and whose rungs differ from the reference.
     #[must_use]
-    pub fn given_up(&self, point: &Point) -> String {
-        let other = |knob: &KnobState| {
-            let [now, exact] = [&point.knobs, &self.reference.knobs].map(|knobs| knobs.get(&knob.knob));
-            (now != exact).then(|| format!("{}={}", knob.knob, now.map_or("", String::as_str)))
+    pub fn simplified<'a>(&'a self, point: &'a Point) -> Vec<Simplified<'a>> {
+        let base = if point.is_path_traced() { Family::Exact } else { Family::Local };
+        let other = |knob: &'a KnobState| {
+            let rung = point.knobs.get(&knob.knob)?;
+            let exact = self.reference.knobs.get(&knob.knob);
+            (Some(rung) != exact).then(|| Simplified { knob, rung, seen: seen(&self.prices, &knob.knob, rung, base) })
         };
-        let all: Vec<String> = self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect();
+        self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect()
+    }
+
+    /// [`simplified`](Self::simplified) as a list of `knob=rung`.
+    #[must_use]
+    pub fn given_up(&self, point: &Point) -> String {
+        let all: Vec<String> = self.simplified(point).iter().map(ToString::to_string).collect();
         if all.is_empty() { "nothing".to_owned() } else { all.join(", ") }
     }
 
@@ -523,5 +586,57 @@ impl Table {
         // The reference comes last.
         all.points.sort_by_key(|point| point.name == REFERENCE);
         Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_rung_shows_in_pictures_of_its_own_base() {
+        let nothing = Interval { median: 0.0, low: 0.0, high: 0.0 };
+        let price = |base: Family, [knob, from, to]: [&str; 3], flip_between: f64, error_told: bool| Price {
+            knob: knob.to_owned(),
+            from: from.to_owned(),
+            to: to.to_owned(),
+            base,
+            point: String::new(),
+            gpu_ms_delta: nothing,
+            turns: 1,
+            share: 0.0,
+            flip_between,
+            flip_delta: 0.0,
+            shown_delta: nothing,
+            error_told,
+            time_told: false,
+            squares: 1,
+            noise_ratio: None,
+            brightness: None,
+            same: false,
+            called_for: true,
+            verdict: String::new(),
+        };
+        let noise = Price {
+            noise_ratio: Some(1.5),
+            ..price(Family::Exact, ["light-sampler", "hierarchy", "power"], 0.05, false)
+        };
+        let all = [
+            price(Family::Local, ["shadows", "map", "off"], 0.02, true),
+            price(Family::Local, ["shadows", "map", "ray"], 0.01, true),
+            price(Family::Exact, ["shadows", "ray", "map"], 0.5, true),
+            price(Family::Exact, ["normals", "f32", "oct16"], 0.03, false),
+            noise,
+        ];
+        let seen = |knob: &str, rung: &str, base: Family| seen(&all, knob, rung, base);
+        // A map differs from a ray; that no shadows differ from a map is no fault of the map.
+        assert_eq!(seen("shadows", "map", Family::Local), Some(0.01));
+        assert_eq!(seen("shadows", "off", Family::Local), Some(0.02));
+        assert_eq!(seen("shadows", "map", Family::Exact), Some(0.5));
+        // Where only the other base has a pair it counts, if paths alone did not make it.
+        assert_eq!(seen("normals", "oct16", Family::Local), Some(0.0));
+        assert_eq!(seen("light-sampler", "power", Family::Local), None);
+        assert_eq!(seen("light-sampler", "power", Family::Exact), Some(0.05));
+        assert_eq!(seen("fresnel", "schlick", Family::Local), None);
     }
 }

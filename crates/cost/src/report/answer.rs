@@ -6,10 +6,10 @@ use std::path::Path;
 use anyhow::Result;
 use maud::{Markup, html};
 
-use super::pictures::{embedded, size};
-use super::{digits, error, percent, plain, time, title, words};
+use super::pictures::{WORST, embedded, size};
+use super::{command_line, command_text, digits, error, percent, plain, time, title, words};
 use crate::statistics::Interval;
-use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Table};
+use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Simplified, Table};
 
 /// Time of a recommended point at the requested size, in words.
 fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> {
@@ -56,6 +56,7 @@ pub(super) fn lead(table: &Table) -> Markup {
     html! {
         "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device and has an " (words::link("error", "error"))
         " of " (percent(point.error())) " of the range from black to white."
+        @if let Some(most) = visible(table, point).first() { " What you lose most by is " b { (most) } ": " (most.about()) }
         @if !table.reference.converged {
             " The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(table.reference.resolution)) "."
         }
@@ -70,17 +71,27 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
         .map(|(settings, point)| {
             let command = at_size(table, point).map_or(&point.command, |(_, at)| &at.command);
             let picture = embedded(&folder.join(format!("{}.png", point.picture)))?;
+            let worst = match point.name == REFERENCE {
+                true => None,
+                false => Some(embedded(&folder.join(format!("{}.worst.png", point.picture)))?),
+            };
             Ok(html! {
                 article.setting {
                     h3 { (settings.join(" and ")) ": " (title(point)) }
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
+                    @if let Some(worst) = worst {
+                        figure {
+                            img.pixels src=(worst) width=(WORST[0]) height=(WORST[1]) alt="The pixels with the largest difference";
+                            figcaption { "where it differs most: the reference on the left, this picture on the right" }
+                        }
+                    }
                     table.facts { tbody {
                         tr { th scope="row" { "time" } td { b { (takes(table, point)) } (spread(table, point)) @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
                         tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "noise below " b { (percent(point.error())) } "; the other pictures are compared with the reference" } @else { (error(point)) } } }
-                        tr { th scope="row" { "simplified" } td { (given_up(table, point)) } }
+                        tr { th scope="row" { "you lose" } td { (lost(table, point)) } }
                     } }
                     @if point.name == REFERENCE && table.reference.rounds.len() > 1 { p.quiet { "A picture of about this quality:" } }
-                    p.command { code { (command.replace(" --repeat 3", "")) } button.copy type="button" { "copy" } }
+                    (command_line(&command.replace(" --repeat 3", "")))
                 }
             })
         })
@@ -93,23 +104,40 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     })
 }
 
-/// Simplified knobs of a point: the first four, and the rest folded; each with a description of its knob as a tooltip.
-fn given_up(table: &Table, point: &Point) -> Markup {
-    let all = table.given_up(point);
-    let list: Vec<&str> = all.split(", ").collect();
-    let [first, rest] = [&list[..list.len().min(4)], &list[list.len().min(4)..]];
-    let about = |choice: &str| {
-        let name = choice.split('=').next().unwrap_or_default();
-        table.knobs.iter().find(|knob| knob.knob == name).map_or("", |knob| knob.about.as_str())
-    };
-    let choices = |list: &[&str]| {
+/// Largest number of simplifications of a recommended setting that are told with their sentences.
+const MOST: usize = 4;
+
+/// Simplified knobs of a point whose effect is visible here, the most visible first.
+fn visible<'a>(table: &'a Table, point: &'a Point) -> Vec<Simplified<'a>> {
+    let mut all = table.simplified(point);
+    all.retain(|choice| choice.seen.is_some_and(|flip| flip > 0.0));
+    all.sort_by(|a, b| b.seen.unwrap_or_default().total_cmp(&a.seen.unwrap_or_default()));
+    all
+}
+
+/// What a point loses: its visible simplifications in words, and the others folded.
+fn lost(table: &Table, point: &Point) -> Markup {
+    let visible = visible(table, point);
+    let (told, rest) = visible.split_at(visible.len().min(MOST));
+    let all = table.simplified(point);
+    let of = |seen: Option<f64>| all.iter().filter(move |choice| choice.seen == seen).copied().collect::<Vec<_>>();
+    let folded = |list: &[Simplified<'_>], what: &str| {
         html! {
-            @for (i, choice) in list.iter().enumerate() { @if i > 0 { ", " } span title=(about(choice)) { (choice) } }
+            @if !list.is_empty() {
+                details.more {
+                    summary { (list.len()) " " (what) }
+                    @for (i, choice) in list.iter().enumerate() { @if i > 0 { ", " } span title=(choice.about()) { (choice) } }
+                }
+            }
         }
     };
     html! {
-        (choices(first))
-        @if !rest.is_empty() { details.more { summary { "and " (rest.len()) " more" } (choices(rest)) } }
+        @if all.is_empty() { "nothing" }
+        @else if told.is_empty() { "nothing that is visible here" }
+        @for choice in told { p { b { (choice) } ": " (choice.about()) } }
+        (folded(rest, "more that are visible"))
+        (folded(&of(Some(0.0)), "simplified, not visible here"))
+        (folded(&of(None), "simplified, not measured alone"))
     }
 }
 
@@ -128,7 +156,8 @@ pub(super) fn trust(table: &Table) -> Markup {
                     (plain(100.0 * RESOLVED)) " %. Run the same command again to improve this reference."
                 }
                 " A question mark marks a difference that may be noise. In at most 1 of 100 runs is any statement of this page "
-                "wrong due to noise (each is at least " (digits(table.standard_errors)) " standard errors from zero)."
+                "wrong due to noise: intervals are two standard errors wide to each side, but a statement is made only from "
+                (digits(table.standard_errors)) " on, because the page makes some two hundred of them."
             }
             table.facts { tbody {
                 tr { th scope="row" { "scene" } td { (table.scene) ", " (table.size[0]) "×" (table.size[1]) } }
@@ -136,7 +165,7 @@ pub(super) fn trust(table: &Table) -> Markup {
                 tr { th scope="row" { "reference" } td {
                     (r.samples) " samples per pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; its noise is " (digits(r.own_flip)) " in " (words::link("flip", "FLIP"))
                 } }
-                tr { th scope="row" { (if r.rounds.len() > 1 { "first picture" } else { "command" }) } td { code { (r.command) } } }
+                tr { th scope="row" { (if r.rounds.len() > 1 { "first picture" } else { "command" }) } td { (command_text(&r.command)) } }
             } }
             @if !table.warnings.is_empty() {
                 ul.warnings { @for warning in &table.warnings { li { (warning) } } }
@@ -159,7 +188,7 @@ pub(super) fn slider(table: &Table, folder: &Path) -> Result<Markup> {
                     @for point in table.points.iter().filter(|point| point.picture != "reference" && all.iter().all(|(_, known)| known.name != point.name)) {
                         option value=(format!("pictures/{}.png", point.picture)) { (title(point)) }
                     }
-                } } "; right: the reference." }
+                } } "; right: the reference. Its grain is its own noise, for which errors are corrected." }
             }
             div.slider style="--at:50%" {
                 img src=(reference) width=(width) height=(height) alt="The reference";

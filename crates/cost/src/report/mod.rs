@@ -101,6 +101,22 @@ fn class(family: Family) -> &'static str {
     }
 }
 
+/// A command; lines break between its options.
+fn command_text(command: &str) -> Markup {
+    let mut parts = command.split(" --");
+    html! {
+        code {
+            (parts.next().unwrap_or_default())
+            @for option in parts { " " span.option { "--" (option) } }
+        }
+    }
+}
+
+/// A command with a button that copies it.
+fn command_line(command: &str) -> Markup {
+    html! { p.command { (command_text(command)) button.copy type="button" { "copy" } } }
+}
+
 /// A section of the page that is folded until it is opened.
 fn folded(id: &str, name: &str, about: Markup, content: Markup) -> Markup {
     html! {

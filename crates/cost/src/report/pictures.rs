@@ -9,7 +9,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use maud::{Markup, html};
 
-use super::{COLOURS, digits, error, hex, percent, time, title, words};
+use super::{COLOURS, command_line, digits, error, hex, percent, time, title, words};
 use crate::table::{Family, Point, REFERENCE, Table};
 use etalon::image::png::{Display, encode_png, over, read_display};
 
@@ -19,6 +19,9 @@ const QUALITY: u8 = 82;
 const GREY: u8 = 119;
 /// Largest number of pixels of an embedded picture.
 const MOST_PIXELS: u32 = 640 * 360;
+
+/// Size of the picture of the worst pixel.
+pub(super) const WORST: [u32; 2] = [328, 160];
 
 /// Size of the pictures for the layout, so that the page does not jump when they load.
 pub(super) fn size(table: &Table) -> [u32; 2] {
@@ -78,7 +81,7 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
             div.three {
                 figure { img loading="lazy" width=(width) height=(height) src=(file(".png")) alt={ (title(point)) ": the picture" }; }
                 figure { img loading="lazy" width=(width) height=(height) src=(file(".error.png")) alt={ (title(point)) ": its error" }; }
-                figure { img.pixels loading="lazy" width="328" height="160" src=(file(".worst.png")) alt="The worst pixel: the reference on the left, the picture on the right"; figcaption { "worst pixel " (e.worst_pixel.x) ", " (e.worst_pixel.y) ": reference, picture" } }
+                figure { img.pixels loading="lazy" width=(WORST[0]) height=(WORST[1]) src=(file(".worst.png")) alt="The worst pixel: the reference on the left, the picture on the right"; figcaption { "worst pixel " (e.worst_pixel.x) ", " (e.worst_pixel.y) ": reference, picture" } }
             }
             p.figures {
                 span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " renders)" }
@@ -88,7 +91,7 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
                 span { (words::link("delta-e", "ΔE2000")) " " (digits(e.delta_e_mean)) }
             }
             p.given { "Simplified: " (table.given_up(point)) }
-            p.command { code { (point.command) } button.copy type="button" { "copy" } }
+            (command_line(&point.command))
         }
     }
 }

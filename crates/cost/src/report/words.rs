@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use maud::{Markup, html};
 
 use crate::table::Table;
-use etalon::lecture::statement;
+use etalon::lecture::{functions, statement};
 
 /// Id, term and definition.
 const WORDS: [(&str, &str, &str); 9] = [
@@ -74,12 +74,16 @@ pub(super) fn lecture(id: &str) -> Markup {
 pub(super) fn statements(table: &Table) -> Markup {
     let ids: BTreeSet<&String> = table.knobs.iter().flat_map(|knob| &knob.lecture).collect();
     let list = html! {
-        dl { @for id in ids { dt id={ "s-" (id) } { (id) } dd { (statement(id).unwrap_or_default().replace("**", "")) } } }
+        dl { @for id in ids { dt id={ "s-" (id) } { (id) } dd {
+            (statement(id).unwrap_or_default().replace("**", ""))
+            @let computed = functions(id);
+            @if !computed.is_empty() { " Computed by " @for (i, name) in computed.iter().enumerate() { @if i > 0 { ", " } code { (name) } } "." }
+        } } }
     };
     super::folded(
         "statements",
         "The lecture's statements",
-        html! { "Statements that the knobs approximate. The shaders and docs/lecture.md use the same ids." },
+        html! { "Statements that the knobs approximate. The shaders and docs/lecture.md use the same ids. docs/equations.md describes the functions, and " code { "etalon eval NAME" } " evaluates one." },
         list,
     )
 }
