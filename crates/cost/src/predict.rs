@@ -16,6 +16,7 @@ use super::statistics::Interval;
 use super::sweep::{Listener, Sweep, SweepExtent};
 use super::table::{Point, REFERENCE, Table};
 use super::warm::Bench;
+use etalon::plan::{Knobs, Model};
 
 /// Default limit for the number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
@@ -53,7 +54,7 @@ pub struct Trial<'a> {
 pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(Step<'_>)) -> Result<Vec<Prediction>> {
     let size = bench.settings.size;
     let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
-    let growth = Growth::of(&few, size)?;
+    let growth = Growth::of(&few, size, &[Knobs::of(Model::Recursive), Knobs::of(Model::Local)])?;
     let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
     let of = |point: &Point| {
@@ -79,6 +80,9 @@ pub struct Score {
     pub pictures: usize,
     /// Rank correlation of errors and of times (Spearman 1904), −1 to 1.
     pub rank: [f64; 2],
+    /// The same over pairs of pictures that the measurement tells apart, because their intervals do not overlap
+    /// (Goodman and Kruskal 1954): pairs in the right order less those in the wrong one, over both.
+    pub told_apart: [f64; 2],
     /// Number of errors and of times that lie in their predicted intervals.
     pub covered: [usize; 2],
 }
@@ -92,14 +96,27 @@ pub fn score(predictions: &[Prediction], table: &Table) -> Score {
         .filter_map(|p| Some((p, found(p)?)))
         .filter(|(_, point)| point.error() > table.reference.resolution)
         .collect();
-    let errors: Vec<(Interval, f64)> = pairs.iter().map(|(p, point)| (p.error, point.error())).collect();
-    let times: Vec<(Interval, f64)> = pairs.iter().map(|(p, point)| (p.gpu_ms, point.gpu_ms.median)).collect();
-    let rank = [&errors, &times].map(|all| {
-        let (foretold, measured): (Vec<f64>, Vec<f64>) = all.iter().map(|(p, found)| (p.median, found)).unzip();
-        correlation(&ranks(&foretold), &ranks(&measured))
+    let errors: Vec<[Interval; 2]> = pairs.iter().map(|(p, point)| [p.error, point.errors.error]).collect();
+    let times: Vec<[Interval; 2]> = pairs.iter().map(|(p, point)| [p.gpu_ms, point.gpu_ms]).collect();
+    let both = [&errors[..], &times[..]];
+    let rank = both.map(|all| {
+        let [foretold, measured] = [0, 1].map(|i| ranks(&all.iter().map(|of| of[i].median).collect::<Vec<_>>()));
+        correlation(&foretold, &measured)
     });
-    let covered = [&errors, &times].map(|all| all.iter().filter(|(p, found)| (p.low..=p.high).contains(found)).count());
-    Score { pictures: pairs.len(), rank, covered }
+    let covered = both.map(|all| all.iter().filter(|[p, found]| (p.low..=p.high).contains(&found.median)).count());
+    Score { pictures: pairs.len(), rank, told_apart: both.map(told_apart), covered }
+}
+
+/// Rank correlation over pairs whose second intervals do not overlap; 1 where there are none.
+fn told_apart(all: &[[Interval; 2]]) -> f64 {
+    let (mut right, mut wrong) = (0.0, 0.0);
+    for ([foretold, measured], [slower, more]) in all.iter().flat_map(|a| all.iter().map(move |b| (a, b))) {
+        if measured.high < more.low {
+            let order = if foretold.median < slower.median { &mut right } else { &mut wrong };
+            *order += 1.0;
+        }
+    }
+    if right + wrong > 0.0 { (right - wrong) / (right + wrong) } else { 1.0 }
 }
 
 /// Ranks of the values, from 0; equal values get their mean rank.
@@ -123,6 +140,17 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pairs_that_nothing_tells_apart_have_no_order() {
+        let exact = |x: f64| Interval { median: x, low: x, high: x };
+        let about = |x: f64| Interval { median: x, low: x - 1.0, high: x + 1.0 };
+        // The last two overlap, and may be foretold in either order.
+        let all = [[exact(1.0), about(1.0)], [exact(9.0), about(5.0)], [exact(8.0), about(5.5)]];
+        assert!((told_apart(&all) - 1.0).abs() < 1e-12);
+        let wrong = [[exact(10.0), about(1.0)], all[1], all[2]];
+        assert!((told_apart(&wrong) + 1.0).abs() < 1e-12);
+    }
 
     #[test]
     fn ranks_are_those_of_order_alone() {

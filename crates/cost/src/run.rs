@@ -26,7 +26,7 @@ use super::warm::{Bench, enough_ms};
 use etalon::frame::Progress;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
-use etalon::plan::Knobs;
+use etalon::plan::{Knobs, Model};
 
 /// Fractions of the budget: for the reference before the changes relative to `exact` are drawn, and for pictures of the
 /// requested size if fewer pixels are measured.
@@ -328,7 +328,7 @@ impl Run<'_> {
         let begun = Instant::now();
         // How times grow with pixels is measured if that fits into the seconds left.
         let growth = match left_s > GROWTH_S + GROWTH_SAMPLES * self.pilot.plain_ms / 1e3 {
-            true => Growth::of(&self.bench, asked)?,
+            true => Growth::of(&self.bench, asked, &[Knobs::of(Model::Local)])?,
             false => Growth::by_pixels(&self.bench, asked),
         };
         left_s -= begun.elapsed().as_secs_f64();

@@ -3,14 +3,16 @@
 //! The mean error of a picture depends little on the number of pixels. A time is the sum of a constant per picture and
 //! a constant per pixel; measurements at two sizes determine both.
 
+use std::collections::BTreeMap;
+
 use anyhow::Result;
 
 use super::command::set;
 use super::statistics::Interval;
 use super::table::Point;
-use super::warm::Bench;
+use super::warm::{Bench, total};
 use etalon::frame::Settings;
-use etalon::plan::{Knobs, Model};
+use etalon::plan::Knobs;
 
 /// Relative scatter of an extrapolated time in addition to noise, because caches behave differently (measured:
 /// docs/cost.md).
@@ -38,41 +40,51 @@ pub fn resized<'a>(bench: &Bench<'a>, size: [u32; 2]) -> Bench<'a> {
 }
 
 /// Growth factors of times from one size to another, for path-traced pictures and for all others.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Growth {
-    paths: f64,
-    others: f64,
+    paths: PassGrowth,
+    others: PassGrowth,
+}
+
+/// Growth factors of each pass, by name, and of a whole picture.
+#[derive(Debug, Clone, Default)]
+struct PassGrowth {
+    passes: BTreeMap<String, f64>,
+    whole: f64,
+}
+
+impl PassGrowth {
+    /// Growth factor of a picture: the mean of those of its passes, weighted by their times.
+    fn of(&self, point: &Point) -> f64 {
+        let (grown, all) = point.passes.iter().fold((0.0, 0.0), |(grown, all), (name, ms)| {
+            (grown + ms * self.passes.get(name).copied().unwrap_or(self.whole), all + ms)
+        });
+        if all > 0.0 { grown / all } else { self.whole }
+    }
 }
 
 impl Growth {
     /// Growth from the bench's size to `size`. Times are measured at the bench's size and at a quarter of its pixels,
-    /// with the exact rungs in RGB, which every run has compiled, and with `local`.
+    /// with the exact rungs in RGB, which every run has compiled, and with `rasters`, rungs without path tracing.
     ///
     /// # Errors
     /// When a picture cannot be drawn.
-    pub fn of(bench: &Bench<'_>, size: [u32; 2]) -> Result<Self> {
-        let times = pixels(size) / pixels(bench.settings.size);
-        let factor = |knobs: &Knobs| -> Result<f64> {
-            let share = share_of_a_picture(bench, knobs)?;
-            Ok(share + (1.0 - share) * times)
-        };
+    pub fn of(bench: &Bench<'_>, size: [u32; 2], rasters: &[Knobs]) -> Result<Self> {
         let exact = set(&set(&Knobs::exact(), "samples", "1")?, "colour", "rgb")?;
-        let paths = factor(&exact)?;
-        Ok(Self { paths, others: factor(&Knobs::of(Model::Local))? })
+        Ok(Self { paths: measured(bench, size, &[exact])?, others: measured(bench, size, rasters)? })
     }
 
     /// Growth in proportion to pixels, without measuring.
     #[must_use]
     pub fn by_pixels(bench: &Bench<'_>, size: [u32; 2]) -> Self {
-        let times = pixels(size) / pixels(bench.settings.size);
-        Self { paths: times, others: times }
+        let all = PassGrowth { whole: pixels(size) / pixels(bench.settings.size), ..PassGrowth::default() };
+        Self { paths: all.clone(), others: all }
     }
 
     /// Extrapolated time of a point.
     #[must_use]
     pub fn of_time(&self, point: &Point) -> Interval {
-        let by_paths = point.knobs.get("indirect").is_some_and(|rung| rung == "path");
-        let factor = if by_paths { self.paths } else { self.others };
+        let factor = if point.is_path_traced() { &self.paths } else { &self.others }.of(point);
         let Interval { median, low, high } = point.gpu_ms;
         Interval {
             median: factor * median,
@@ -82,20 +94,42 @@ impl Growth {
     }
 }
 
-/// Fraction of a time that does not depend on the number of pixels, measured at two sizes.
-fn share_of_a_picture(bench: &Bench<'_>, knobs: &Knobs) -> Result<f64> {
-    let time = |bench: &Bench<'_>| -> Result<f64> {
-        let mut warm = bench.warm_up(knobs)?;
-        let (mut least, mut all, mut count) = (f64::INFINITY, 0.0, 0);
-        while count < 5 && all < ENOUGH_MS {
-            let ms = bench.time(&mut warm)?;
-            (least, all, count) = (ms.min(least), all + ms, count + 1);
-        }
-        Ok(least)
-    };
+/// Growth factors measured with some rungs. A pass of several of them goes by the last.
+fn measured(bench: &Bench<'_>, size: [u32; 2], all: &[Knobs]) -> Result<PassGrowth> {
     let small = resized(bench, fewer(bench.settings.size, 4.0));
-    let [all, few] = [time(bench)?, time(&small)?];
-    let more = (pixels(bench.settings.size) - pixels(small.settings.size)).max(1.0);
-    let each = (all - few) / more;
-    Ok((1.0 - each * pixels(bench.settings.size) / all.max(1e-9)).clamp(0.0, 1.0))
+    let [few, here, asked] = [small.settings.size, bench.settings.size, size].map(pixels);
+    // A time is a + b·pixels.
+    let grown = |few_ms: f64, here_ms: f64| {
+        let each = (here_ms - few_ms) / (here - few).max(1.0);
+        let share = (1.0 - each * here / here_ms.max(1e-9)).clamp(0.0, 1.0);
+        share + (1.0 - share) * asked / here
+    };
+    let mut growth = PassGrowth::default();
+    for knobs in all {
+        let [few, here] = [least(&small, knobs)?, least(bench, knobs)?];
+        growth.whole = grown(few.values().sum(), here.values().sum());
+        let known = here.iter().filter_map(|(name, ms)| Some((name.clone(), grown(*few.get(name)?, *ms))));
+        growth.passes.extend(known);
+    }
+    Ok(growth)
+}
+
+/// Milliseconds of each pass, by name, in the fastest of several renders.
+fn least(bench: &Bench<'_>, knobs: &Knobs) -> Result<BTreeMap<String, f64>> {
+    let mut warm = bench.warm_up(knobs)?;
+    let (mut least, mut all, mut count) = (f64::INFINITY, 0.0, 0);
+    let mut passes = BTreeMap::new();
+    while count < 5 && all < ENOUGH_MS {
+        let rendered = warm.renderer.render(bench.camera, &mut |_| ())?;
+        let ms = total(&rendered);
+        (all, count) = (all + ms, count + 1);
+        if ms < least {
+            least = ms;
+            passes.clear();
+            for pass in rendered.passes {
+                *passes.entry(pass.name).or_insert(0.0) += pass.ms;
+            }
+        }
+    }
+    Ok(passes)
 }
