@@ -1,6 +1,6 @@
 //! Time-sliced submission draws the same picture in short pieces as one submission does, to the last bit.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use etalon::frame::Settings;
 use etalon::gpu::Interrupted;
@@ -109,15 +109,18 @@ fn short_passes_share_submissions() {
         let mut renderer = gpu.renderer(&scene, None, settings);
         let passes = renderer.passes(&scene.cameras[0]).expect("passes").len();
         let mut drawing = renderer.begin(&scene.cameras[0], 64);
-        let mut turns = Vec::new();
-        for _ in 0..16 {
-            let before = gpu.device.turns();
+        let mut step = || {
+            let (before, begun) = (gpu.device.turns(), Instant::now());
             renderer.step(&mut drawing).expect("a sample");
-            turns.push(gpu.device.turns() - before);
-        }
-        let first = turns[0];
+            (gpu.device.turns() - before, begun.elapsed().as_secs_f64())
+        };
+        let (first, _) = step();
+        // Two neighbouring submissions take more than a slice of 10 ms together, or they would be one: a busy machine
+        // needs more of them.
+        let beyond = |(turns, seconds): (u64, f64)| turns.saturating_sub((seconds / 5e-3) as u64);
+        let mut turns: Vec<u64> = (1..16).map(|_| beyond(step())).collect();
         turns.sort_unstable();
         assert!(passes > 90 && first > 60, "{passes} passes, {first} submissions of the first sample");
-        assert!(turns[8] <= 4, "submissions of {architecture:?}'s samples: {turns:?}");
+        assert!(turns[7] <= 4, "submissions of {architecture:?}'s samples beyond those of their time: {turns:?}");
     }
 }
