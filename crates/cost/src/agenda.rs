@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::command::set;
 use super::table::{Family, KnobState};
 use super::warm::Bench;
+use etalon::plan::rungs::{Caustics, Guiding};
 use etalon::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
 
 /// Change of one knob relative to a base.
@@ -204,7 +205,7 @@ impl Agenda {
         let priced = priced.unwrap_or_else(|| super::reference::samples_within(plain_ms, most).min(16));
         let priced_rung = priced.to_string();
         let plain = set(&three_colours, "samples", &priced_rung)?;
-        let mut of_exact = Vec::new();
+        let mut of_exact = without_paths(bench, states, &plain)?;
         for task in exact_changes {
             of_exact.push(Task { knobs: set(&task.knobs, "samples", &priced_rung)?, ..task });
         }
@@ -225,6 +226,30 @@ impl Agenda {
     pub fn priced(&self) -> u32 {
         self.plain.samples.count()
     }
+}
+
+/// These knobs with another rung of `indirect`, and without what only paths use.
+#[must_use]
+pub fn with_indirect(knobs: &Knobs, rung: &str) -> Option<Knobs> {
+    Knobs { guiding: Guiding::Off, caustics: Caustics::Off, ..knobs.clone() }.with("indirect", rung)
+}
+
+/// The reference's rungs with the indirect light of the presets without path tracing. A rung whose plan equals that of
+/// the rung before is skipped.
+fn without_paths(bench: &Bench<'_>, states: &States, plain: &Knobs) -> Result<Vec<Task>> {
+    let mut all: Vec<Task> = Vec::new();
+    let Some(knob) = states.called_for().find(|knob| knob.name == "indirect") else { return Ok(all) };
+    let mut before: Option<Plan> = None;
+    for model in [Model::Recursive, Model::Local] {
+        let to = knob.rung(&Knobs::of(model));
+        let Some(knobs) = with_indirect(plain, to) else { continue };
+        let plan = bench.plan(&knobs)?;
+        if before.as_ref().is_none_or(|before| !(before.draws_as(&plan) && before.kept().eq(plan.kept()))) {
+            all.push(changed(Family::Exact, knob, knob.rung(plain), to, knobs));
+        }
+        before = Some(plan);
+    }
+    Ok(all)
 }
 
 /// Spectral rendering compared with RGB, up to the number of bands of the reference.

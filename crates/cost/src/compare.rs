@@ -8,7 +8,7 @@ use super::agenda::Change;
 use super::difference::ShownReference;
 use super::price::{Pair, PairedTimes, TimeNoise, price};
 use super::statistics::{Interval, MANY, standard_errors};
-use super::table::{Price, WorstPixel};
+use super::table::{Family, Price, WorstPixel};
 use super::warm::{Bench, ENOUGH_MS};
 use etalon::image::metric::{AnyPicture, Metric, compare, map_rgba};
 use etalon::image::png::encode_png;
@@ -81,7 +81,8 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let more = truth.halves.is_none().then(|| ShownReference::exact(&truth.display).error(&measured.display));
     let clock = TimeNoise::of([(&measured.ms[..], &measured.baseline_ms[..])].into_iter());
     let turns = PairedTimes { ms: &measured.ms, baseline_ms: &measured.baseline_ms, clock };
-    let price = price(&change, &pair, more, turns, STATEMENTS, standard_errors(STATEMENTS, MANY));
+    let family = if more.is_some() { Family::Local } else { Family::Exact };
+    let price = price(&change, (&pair, family), more, turns, STATEMENTS, standard_errors(STATEMENTS, MANY));
     Ok(Compared {
         knob: knob.name,
         rungs,

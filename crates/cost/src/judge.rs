@@ -27,9 +27,6 @@ const AROUND: i64 = 20;
 /// A step along the frontier is always worth taking if it reduces the squared error to this factor for at most this
 /// factor of time.
 const CHEAP: [f64; 2] = [0.6, 2.0];
-/// Least distance of a corner (knee) below the line, as a fraction of the line in logarithms; without a corner `quick`
-/// is also `balanced`.
-const CORNER: f64 = 0.05;
 /// The reference itself is recommended as `exact` where no other point has an error below this multiple of its
 /// resolution.
 const FAR: f64 = 2.0;
@@ -134,18 +131,25 @@ impl Judge<'_> {
             let Some((change, pair)) = &record.pair else { continue };
             let base = base(record.family).context("a base must be drawn before its changes")?;
             let local = record.family == Family::Local;
-            let more = local.then(|| self.truth.shown.more_error(&displays[i], &displays[base]));
+            // The limit of the base `exact` is that of the reference: the error of a picture without paths, which has no
+            // half buffers, is its difference from it.
+            let more = match record.family {
+                Family::Local => Some(self.truth.shown.more_error(&displays[i], &displays[base])),
+                _ => (!points[i].is_path_traced()).then(|| self.truth.shown.error(&displays[i])),
+            };
             let clock = clocks[usize::from(!local)];
             let [ms, baseline_ms] = in_the_middle([&record.ms, &record.baseline_ms], points[base].gpu_ms.median);
             let turns = PairedTimes { ms: &ms, baseline_ms: &baseline_ms, clock };
             prices.push(Price {
                 point: record.name.clone(),
                 flip_delta: points[i].errors.flip_mean - points[base].errors.flip_mean,
-                ..price(change, pair, more, turns, statements, sure)
+                ..price(change, (pair, record.family), more, turns, statements, sure)
             });
         }
-        let frontier = self.frontier(&points, &displays, sure);
-        let recommended = recommended(&points, &frontier);
+        let frontier = self.frontier(&points, &displays, sure, |_| true);
+        // `local` with one knob changed may owe its place to two errors that cancel.
+        let meant = |point: &Point| matches!(point.family, Family::Preset | Family::Search);
+        let recommended = recommended(&points, &self.frontier(&points, &displays, sure, meant));
         Ok(Judged { points, frontier, recommended, prices, standard_errors: sure })
     }
 
@@ -199,15 +203,15 @@ impl Judge<'_> {
         })
     }
 
-    /// Pareto frontier: indices of the points that no other point beats in time and error at once, the fastest first,
-    /// the reference last. Each point has significantly less error than the one before. Of two points with equal times
+    /// Pareto frontier of some points: indices of those that no other of them beats in time and error at once, the
+    /// fastest first, the reference last. Each point has significantly less error than the one before. Of two points with equal times
     /// the better one is kept.
-    fn frontier(&self, points: &[Point], displays: &[Display], sure: f64) -> Vec<usize> {
+    fn frontier(&self, points: &[Point], displays: &[Display], sure: f64, some: impl Fn(&Point) -> bool) -> Vec<usize> {
         let reference = points.iter().position(|point| point.name == REFERENCE);
         let time = |i: usize| points[i].gpu_ms.median;
         // The reference dominates every point that takes longer.
         let limit = reference.map_or(f64::INFINITY, time);
-        let mut order: Vec<usize> = (0..displays.len()).filter(|&i| time(i) < limit).collect();
+        let mut order: Vec<usize> = (0..displays.len()).filter(|&i| time(i) < limit && some(&points[i])).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
         let mut all: Vec<usize> = Vec::new();
         for i in order {
@@ -225,15 +229,12 @@ impl Judge<'_> {
     }
 }
 
-/// Recommended settings from the frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]).
-/// `exact` is the most exact point, or the reference where no point comes close to it. `balanced` is the knee: the
-/// point farthest below the line between both, in logarithms. Only presets and results of the search take part, because
-/// `local` with one knob changed may be on the frontier due to two errors that cancel.
+/// Recommended settings from a frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]).
+/// `exact` is the most exact point, or the reference where no point comes close to it. `balanced` is the best
+/// [`compromise`] between both, or `quick` where there is none.
 fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     let (time, error) = (|i: usize| points[i].gpu_ms.median, |i: usize| points[i].error());
-    let meant =
-        |i: &usize| points[*i].name == REFERENCE || matches!(points[*i].family, Family::Preset | Family::Search);
-    let mut all: Vec<usize> = frontier.iter().copied().filter(meant).collect();
+    let mut all = frontier.to_vec();
     if let [.., best, reference] = all[..]
         && points[reference].name == REFERENCE
         && error(best) < FAR * error(reference)
@@ -251,15 +252,24 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     while let Some(next) = cheap(quick) {
         quick = next;
     }
-    // Knee of the curve in logarithms (Satopää et al. 2011).
-    let part = |value: f64, [from, to]: [f64; 2]| {
-        if from == to { 0.0 } else { (value.max(1e-9) / from.max(1e-9)).ln() / (to.max(1e-9) / from.max(1e-9)).ln() }
-    };
-    let below = |i: usize| part(error(i), [error(quick), error(exact)]) - part(time(i), [time(quick), time(exact)]);
-    let between = all.iter().copied().filter(|&i| time(i) > time(quick) && below(i) > CORNER);
-    let balanced = between.max_by(|&a, &b| below(a).total_cmp(&below(b))).unwrap_or(quick);
+    let of = |i: usize| [time(i), error(i)];
+    let between: Vec<usize> = all.iter().copied().filter(|&i| time(i) > time(quick) && i != exact).collect();
+    let costs: Vec<[f64; 2]> = between.iter().map(|&i| of(i)).collect();
+    let balanced = compromise([of(quick), of(exact)], &costs).map_or(quick, |place| between[place]);
     let named = [("quick", quick), ("balanced", balanced), ("exact", exact)];
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()
+}
+
+/// The best compromise between a quick and an exact point, each a time and an error: of the ways in time from `quick`
+/// and in error to `exact`, as fractions of the whole ways in logarithms, the larger one is least (compromise
+/// programming; Zeleny 1973).
+fn compromise([quick, exact]: [[f64; 2]; 2], between: &[[f64; 2]]) -> Option<usize> {
+    let part = |from: f64, value: f64, to: f64| {
+        let [from, value, to] = [from, value, to].map(|x| x.max(1e-9).ln());
+        if from == to { 0.0 } else { (value - from) / (to - from) }
+    };
+    let regret = |[time, error]: [f64; 2]| part(quick[0], time, exact[0]).max(part(exact[1], error, quick[1]));
+    (0..between.len()).min_by(|&a, &b| regret(between[a]).total_cmp(&regret(between[b])))
 }
 
 /// Scales the interleaved times of a picture and its base so that the median of the base is `base_ms`, its median over
@@ -378,6 +388,16 @@ mod tests {
             "noise": null, "work": {}, "command": "", "image": "", "picture": name, "pair": null,
         }))
         .expect("a record")
+    }
+
+    #[test]
+    fn a_compromise_is_neither_nearly_quick_nor_nearly_exact() {
+        // study:cornell at 128x72, milliseconds and percent.
+        let [quick, exact] = [[1.44, 9.545], [3132.0, 0.413]];
+        let between = [[1.73, 8.731], [4.15, 8.515], [58.3, 7.578], [63.6, 5.222], [343.0, 2.687], [1609.0, 1.25]];
+        assert_eq!(compromise([quick, exact], &between), Some(4));
+        assert_eq!(compromise([quick, exact], &between[..2]), Some(1));
+        assert_eq!(compromise([quick, exact], &[]), None);
     }
 
     #[test]

@@ -109,13 +109,13 @@ pub struct PairedTimes<'a> {
     pub clock: TimeNoise,
 }
 
-/// Cost of a change. `more_error` is the difference of the mean squared errors of picture and base against a reference;
-/// `None` for path-traced pictures, which are compared with each other. The caller sets `point`; `flip_delta` is the
-/// FLIP error between both.
+/// Cost of a change in a picture of a family. `more_error` is the mean squared error that it adds, judged by a
+/// reference; `None` for path-traced pictures, which are compared with each other. The caller sets `point`; `flip_delta`
+/// is the FLIP error between both.
 #[must_use]
 pub fn price(
     change: &Change,
-    pair: &Pair,
+    (pair, base): (&Pair, Family),
     more_error: Option<Estimate>,
     turns: PairedTimes<'_>,
     statements: usize,
@@ -125,12 +125,9 @@ pub fn price(
     let differences: Vec<f64> = ms.iter().zip(baseline_ms).map(|(a, b)| a - b).collect();
     let gpu_ms_delta = Interval::of(&differences);
     let base_ms = Interval::of(baseline_ms).median;
-    let (base, squares, more) = match more_error {
-        Some(more) => (Family::Local, 1, more),
-        None => {
-            let (side, found) = significant(&pair.squares, sure).unwrap_or((1, Estimate::default()));
-            (Family::Exact, side, found)
-        }
+    let (squares, more) = match more_error {
+        Some(more) => (1, more),
+        None => significant(&pair.squares, sure).unwrap_or((1, Estimate::default())),
     };
     let mut price = Price {
         knob: change.knob.clone(),
@@ -236,7 +233,7 @@ mod tests {
             let pair = Pair { flip: 0.0001, same: false, squares: Vec::new(), noise_ratio: None, brightness };
             let turns =
                 PairedTimes { ms: &[10.0], baseline_ms: &[10.0], clock: TimeNoise { deviation: 0.01, freedom: 9.0 } };
-            price(&change, &pair, Some(Estimate::default()), turns, 100, 4.0).verdict
+            price(&change, (&pair, Family::Local), Some(Estimate::default()), turns, 100, 4.0).verdict
         };
         // Measured with an error of one thousandth in π in the lobe of one tier: study:lamps and study:materials at
         // 160x90.

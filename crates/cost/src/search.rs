@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 
-use super::agenda::{Agenda, States, Task};
+use super::agenda::{Agenda, States, Task, with_indirect};
 use super::command::set;
 use super::judge::{Judge, Record};
 use super::measure::{Base, Measuring};
@@ -168,7 +168,8 @@ pub fn without_waste(
     let mut knobs = agenda.plain.clone();
     let mut saved = Vec::new();
     for price in best.into_values() {
-        if let Some(changed) = knobs.with(&price.knob, &price.to) {
+        let of_paths = || (price.knob == "indirect").then(|| with_indirect(&knobs, &price.to)).flatten();
+        if let Some(changed) = knobs.with(&price.knob, &price.to).or_else(of_paths) {
             saved.push(format!("{}={}", price.knob, price.to));
             knobs = changed;
         }

@@ -38,7 +38,7 @@ pub struct Table {
     /// Pareto frontier: indices into `points`, the fastest first, the reference last. Each point has significantly less
     /// error than the one before.
     pub frontier: Vec<usize>,
-    /// Recommended settings on the frontier.
+    /// Recommended settings, from a frontier of presets and results of the search alone.
     #[serde(default)]
     pub recommended: Vec<Recommended>,
     /// Standard errors from zero that make a statement significant (Bonferroni correction).
@@ -362,6 +362,11 @@ impl Price {
         place(&self.to) > place(&self.from)
     }
 
+    /// The less exact one of both rungs.
+    fn cheaper_rung(&self) -> &str {
+        if self.to_more_exact() { &self.from } else { &self.to }
+    }
+
     /// Whether the change reduces the error although it approximates more: its error cancels another error of the base.
     #[must_use]
     pub fn undoes_another(&self) -> bool {
@@ -442,15 +447,20 @@ impl Display for Simplified<'_> {
 }
 
 /// Largest visible difference (FLIP) that was measured between a rung and a more exact one with all other knobs alike;
-/// 0 if none was visible, `None` if no such pair was drawn. Pairs with this base count. Where there are none, those
-/// with the other base do, but for pairs that differ in the noise of their paths alone.
-fn seen(prices: &[Price], knob: &str, rung: &str, base: Family) -> Option<f64> {
-    let cheaper = |price: &Price| if price.to_more_exact() { price.from == rung } else { price.to == rung };
-    let pairs = prices.iter().filter(|price| price.knob == knob && cheaper(price));
-    let (alike, others): (Vec<&Price>, Vec<&Price>) = pairs.partition(|price| price.base == base);
-    let others = others.into_iter().filter(|price| price.noise_ratio.is_none());
-    let counted = if alike.is_empty() { others.collect() } else { alike };
-    counted.iter().map(|price| if price.shows() { price.flip_between } else { 0.0 }).reduce(f64::max)
+/// 0 if none was visible, `None` if no such pair was drawn. A rung that was not drawn loses what the next more exact one
+/// does that was. Pairs with this base count. If none of them reaches the knob's exact rung, those with the other base
+/// do too, but for pairs that differ in the noise of their paths alone.
+fn seen(prices: &[Price], knob: &Knob, rung: &str, base: Family) -> Option<f64> {
+    let place = knob.rungs.iter().position(|known| *known == rung)?;
+    let pairs_of = |rung: &&str| {
+        let pairs = prices.iter().filter(|price| price.knob == knob.name && price.cheaper_rung() == *rung);
+        let (mut counted, others): (Vec<&Price>, Vec<&Price>) = pairs.partition(|price| price.base == base);
+        if !counted.iter().any(|price| price.to == knob.exact || price.from == knob.exact) {
+            counted.extend(others.into_iter().filter(|price| price.noise_ratio.is_none()));
+        }
+        counted.into_iter().map(|price| if price.shows() { price.flip_between } else { 0.0 }).reduce(f64::max)
+    };
+    knob.rungs[place..].iter().find_map(pairs_of)
 }
 
 /// Name of the reference among the points.
@@ -464,7 +474,8 @@ impl Table {
         let other = |knob: &'a KnobState| {
             let rung = point.knobs.get(&knob.knob)?;
             let exact = self.reference.knobs.get(&knob.knob);
-            (Some(rung) != exact).then(|| Simplified { knob, rung, seen: seen(&self.prices, &knob.knob, rung, base) })
+            let seen = || seen(&self.prices, Knob::named(&knob.knob)?, rung, base);
+            (Some(rung) != exact).then(|| Simplified { knob, rung, seen: seen() })
         };
         self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect()
     }
@@ -626,14 +637,20 @@ mod tests {
             price(Family::Local, ["shadows", "map", "ray"], 0.01, true),
             price(Family::Exact, ["shadows", "ray", "map"], 0.5, true),
             price(Family::Exact, ["normals", "f32", "oct16"], 0.03, false),
+            price(Family::Local, ["indirect", "ambient", "off"], 0.01, true),
+            price(Family::Exact, ["indirect", "path", "occlusion:16"], 0.2, true),
             noise,
         ];
-        let seen = |knob: &str, rung: &str, base: Family| seen(&all, knob, rung, base);
+        let seen = |knob: &str, rung: &str, base: Family| seen(&all, Knob::named(knob).expect("a knob"), rung, base);
         // A map differs from a ray; that no shadows differ from a map is no fault of the map.
         assert_eq!(seen("shadows", "map", Family::Local), Some(0.01));
         assert_eq!(seen("shadows", "off", Family::Local), Some(0.02));
         assert_eq!(seen("shadows", "map", Family::Exact), Some(0.5));
-        // Where only the other base has a pair it counts, if paths alone did not make it.
+        // Where only the other base has a pair, or one with the exact rung, it counts, if paths alone did not make it.
+        assert_eq!(seen("indirect", "occlusion:16", Family::Local), Some(0.2));
+        // A rung that was not drawn loses what a more exact one does.
+        assert_eq!(seen("indirect", "ambient", Family::Local), Some(0.2));
+        assert_eq!(seen("indirect", "occlusion:64", Family::Local), None);
         assert_eq!(seen("normals", "oct16", Family::Local), Some(0.0));
         assert_eq!(seen("light-sampler", "power", Family::Local), None);
         assert_eq!(seen("light-sampler", "power", Family::Exact), Some(0.05));

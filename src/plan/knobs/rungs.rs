@@ -386,7 +386,7 @@ knob! {
     Indirect = "indirect" {
         /// No ambient and no indirect light: what no light reaches is black.
         Off = "off",
-        /// Light of the environment from all around, as if no surface were in its way.
+        /// Light of the environment from all around, as if no surface were in its way; surfaces light no others.
         Ambient = "ambient",
         #[doc = occlusion_about!(4)]
         Occlusion4 = "occlusion:4",
