@@ -131,8 +131,8 @@ impl Judge<'_> {
             let Some((change, pair)) = &record.pair else { continue };
             let base = base(record.family).context("a base must be drawn before its changes")?;
             let local = record.family == Family::Local;
-            // The limit of the base `exact` is that of the reference: the error of a picture without paths, which has no
-            // half buffers, is its difference from it.
+            // The limit of the base `exact` is that of the reference: the error of a picture without paths, which has
+            // no half buffers, is its difference from it.
             let more = match record.family {
                 Family::Local => Some(self.truth.shown.more_error(&displays[i], &displays[base])),
                 _ => (!points[i].is_path_traced()).then(|| self.truth.shown.error(&displays[i])),
@@ -204,8 +204,8 @@ impl Judge<'_> {
     }
 
     /// Pareto frontier of some points: indices of those that no other of them beats in time and error at once, the
-    /// fastest first, the reference last. Each point has significantly less error than the one before. Of two points with equal times
-    /// the better one is kept.
+    /// fastest first, the reference last. Each point has significantly less error than the one before. Of two points
+    /// with equal times the better one is kept.
     fn frontier(&self, points: &[Point], displays: &[Display], sure: f64, some: impl Fn(&Point) -> bool) -> Vec<usize> {
         let reference = points.iter().position(|point| point.name == REFERENCE);
         let time = |i: usize| points[i].gpu_ms.median;

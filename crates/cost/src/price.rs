@@ -110,8 +110,8 @@ pub struct PairedTimes<'a> {
 }
 
 /// Cost of a change in a picture of a family. `more_error` is the mean squared error that it adds, judged by a
-/// reference; `None` for path-traced pictures, which are compared with each other. The caller sets `point`; `flip_delta`
-/// is the FLIP error between both.
+/// reference; `None` for path-traced pictures, which are compared with each other. The caller sets `point`;
+/// `flip_delta` is the FLIP error between both.
 #[must_use]
 pub fn price(
     change: &Change,

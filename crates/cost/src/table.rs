@@ -447,9 +447,9 @@ impl Display for Simplified<'_> {
 }
 
 /// Largest visible difference (FLIP) that was measured between a rung and a more exact one with all other knobs alike;
-/// 0 if none was visible, `None` if no such pair was drawn. A rung that was not drawn loses what the next more exact one
-/// does that was. Pairs with this base count. If none of them reaches the knob's exact rung, those with the other base
-/// do too, but for pairs that differ in the noise of their paths alone.
+/// 0 if none was visible, `None` if no such pair was drawn. A rung that was not drawn loses what the next more exact
+/// one does that was. Pairs with this base count. If none of them reaches the knob's exact rung, those with the other
+/// base do too, but for pairs that differ in the noise of their paths alone.
 fn seen(prices: &[Price], knob: &Knob, rung: &str, base: Family) -> Option<f64> {
     let place = knob.rungs.iter().position(|known| *known == rung)?;
     let pairs_of = |rung: &&str| {
