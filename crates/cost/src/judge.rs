@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::agenda::Change;
-use super::difference::Truth;
+use super::difference::{ShownReference, Truth};
 use super::price::{Pair, PairedTimes, TimeNoise, price};
 use super::reference::display_of;
-use super::statistics::{Interval, MANY, standard_errors};
+use super::statistics::{Estimate, Interval, MANY, standard_errors};
 use super::table::{Errors, Family, Other, Point, Price, REFERENCE, Recommended, Reference, WorstPixel};
 use etalon::frame::Settings;
 use etalon::gpu::Compiled;
@@ -131,11 +131,9 @@ impl Judge<'_> {
             let Some((change, pair)) = &record.pair else { continue };
             let base = base(record.family).context("a base must be drawn before its changes")?;
             let local = record.family == Family::Local;
-            // The limit of the base `exact` is that of the reference: the error of a picture without paths, which has
-            // no half buffers, is its difference from it.
             let more = match record.family {
                 Family::Local => Some(self.truth.shown.more_error(&displays[i], &displays[base])),
-                _ => (!points[i].is_path_traced()).then(|| self.truth.shown.error(&displays[i])),
+                _ => (!points[i].is_path_traced()).then(|| self.without_paths(records, &displays, i)),
             };
             let clock = clocks[usize::from(!local)];
             let [ms, baseline_ms] = in_the_middle([&record.ms, &record.baseline_ms], points[base].gpu_ms.median);
@@ -151,6 +149,26 @@ impl Judge<'_> {
         let meant = |point: &Point| matches!(point.family, Family::Preset | Family::Search);
         let recommended = recommended(&points, &self.frontier(&points, &displays, sure, meant));
         Ok(Judged { points, frontier, recommended, prices, standard_errors: sure })
+    }
+
+    /// Squared difference of a picture without paths from the limit of the base `exact`, which is that of the
+    /// reference. It has no half buffers: what its few samples for each pixel add is the squared difference between
+    /// `local` with as many and with 64. That is taken away, and bounds the bias of what is left.
+    fn without_paths(&self, records: &[Record], displays: &[Display], i: usize) -> Estimate {
+        let found = self.truth.shown.error(&displays[i]);
+        let local = |samples: &str| {
+            let like = |record: &Record| match record.name.strip_prefix("local") {
+                Some("") => record.knobs["samples"] == samples,
+                Some(rest) => rest.strip_prefix(" samples=") == Some(samples),
+                None => false,
+            };
+            Some(&displays[records.iter().position(like)?])
+        };
+        let of_samples = match (local(&records[i].knobs["samples"]), local("64")) {
+            (Some(few), Some(many)) => ShownReference::exact(many).error(few).mean,
+            _ => found.mean,
+        };
+        Estimate { mean: found.mean - of_samples, bias: found.bias + of_samples, ..found }
     }
 
     /// Evaluates a picture of another program.

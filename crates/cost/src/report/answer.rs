@@ -10,6 +10,7 @@ use super::pictures::{WORST, embedded, size};
 use super::{command_line, command_text, digits, error, percent, plain, time, title, words};
 use crate::statistics::Interval;
 use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Simplified, Table};
+use etalon::plan::rungs::Indirect;
 
 /// Time of a recommended point at the requested size, in words.
 fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> {
@@ -56,7 +57,7 @@ pub(super) fn lead(table: &Table) -> Markup {
     html! {
         "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device and has an " (words::link("error", "error"))
         " of " (percent(point.error())) " of the range from black to white."
-        @if let Some(most) = visible(table, point).first() { " What you lose most by is " b { (most) } ": " (most.about()) }
+        @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most) } ": " (most.about()) }
         @if !table.reference.converged {
             " The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(table.reference.resolution)) "."
         }
@@ -113,6 +114,14 @@ fn visible<'a>(table: &'a Table, point: &'a Point) -> Vec<Simplified<'a>> {
     all.retain(|choice| choice.seen.is_some_and(|flip| flip > 0.0));
     all.sort_by(|a, b| b.seen.unwrap_or_default().total_cmp(&a.seen.unwrap_or_default()));
     all
+}
+
+/// The most visible simplification. Nothing where indirect light, often the largest one, was not measured.
+fn most_lost<'a>(table: &'a Table, point: &'a Point) -> Option<Simplified<'a>> {
+    let indirect = Indirect::Path.choice().knob;
+    let unknown = |choice: &Simplified<'_>| choice.knob.knob == indirect && choice.seen.is_none();
+    let all_known = !table.simplified(point).iter().any(unknown);
+    visible(table, point).first().copied().filter(|_| all_known)
 }
 
 /// What a point loses: its visible simplifications in words, and the others folded.
