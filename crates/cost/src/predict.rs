@@ -20,9 +20,9 @@ use etalon::plan::{Knobs, Model};
 
 /// Default limit for the number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance
-/// (measured: docs/cost.md).
-const OTHER_PIXELS: f64 = 0.15;
+/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance, times
+/// the root of their number (measured: docs/cost.md).
+const OTHER_PIXELS: f64 = 3.0;
 
 /// Predicted time and error of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,6 +54,7 @@ pub struct Trial<'a> {
 pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(Step<'_>)) -> Result<Vec<Prediction>> {
     let size = bench.settings.size;
     let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
+    let scatter = OTHER_PIXELS / pixels(few.settings.size).sqrt();
     let growth = Growth::of(&few, size, &[Knobs::of(Model::Recursive), Knobs::of(Model::Local)])?;
     let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
@@ -63,11 +64,7 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
             picture: point.name.clone(),
             knobs: point.knobs.clone(),
             gpu_ms: growth.of_time(point),
-            error: Interval {
-                median: e.median,
-                low: e.low * (1.0 - OTHER_PIXELS),
-                high: e.high * (1.0 + OTHER_PIXELS),
-            },
+            error: Interval { median: e.median, low: e.low * (1.0 - scatter), high: e.high * (1.0 + scatter) },
         }
     };
     Ok(table.points.iter().filter(|point| point.name != REFERENCE).map(of).collect())

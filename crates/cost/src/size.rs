@@ -16,7 +16,7 @@ use etalon::plan::Knobs;
 
 /// Relative scatter of an extrapolated time in addition to noise, because caches behave differently (measured:
 /// docs/cost.md).
-const OTHER_SIZE: f64 = 0.25;
+const OTHER_SIZE: f64 = 0.1;
 
 /// Total milliseconds of the renders of which the fastest counts, unless there are five.
 const ENOUGH_MS: f64 = 300.0;
