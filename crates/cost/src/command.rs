@@ -16,9 +16,9 @@ pub fn named(knobs: &Knobs) -> BTreeMap<String, String> {
     knobs.list().into_iter().map(|(knob, rung)| (knob.to_owned(), rung.to_owned())).collect()
 }
 
-/// `--model` and `--set` options for these knobs, with the preset that needs the fewest `--set` options.
+/// The preset that needs the fewest `--set` options for these knobs, and those options.
 #[must_use]
-pub fn arguments(knobs: &Knobs) -> String {
+pub fn nearest_preset(knobs: &Knobs) -> (&'static str, Vec<String>) {
     let rest = |model: Model| -> Vec<String> {
         let preset = Knobs::of(model).list();
         // --model global selects spectral rendering for dispersive glass unless `colour` is given.
@@ -29,5 +29,12 @@ pub fn arguments(knobs: &Knobs) -> String {
     let all = [(Model::Local, "local"), (Model::Recursive, "recursive"), (Model::Global, "global")];
     let least = all.map(|(model, name)| (rest(model), name)).into_iter().min_by_key(|(rest, _)| rest.len());
     let (rest, name) = least.unwrap_or_default();
+    (name, rest)
+}
+
+/// `--model` and `--set` options for these knobs.
+#[must_use]
+pub fn arguments(knobs: &Knobs) -> String {
+    let (name, rest) = nearest_preset(knobs);
     std::iter::once(format!("--model {name}")).chain(rest).collect::<Vec<_>>().join(" ")
 }

@@ -18,12 +18,15 @@ use super::statistics::{Estimate, Interval, MANY, standard_errors};
 use super::table::{Errors, Family, Other, Point, Price, REFERENCE, Recommended, Reference, WorstPixel};
 use etalon::frame::Settings;
 use etalon::gpu::Compiled;
-use etalon::image::metric::{AnyPicture, Comparison, map_rgba};
+use etalon::image::metric::{AnyPicture, map_rgba};
 use etalon::image::png::{Display, read_display};
 use etalon::image::{Picture, exr, file, png};
 
-/// Half side in pixels of the detail around the worst pixel.
+/// Half side in pixels of the detail around the place that differs most.
 const AROUND: i64 = 20;
+/// Side in pixels of the squares whose means are compared, and the step between them.
+const REGION: usize = 16;
+const STRIDE: usize = 4;
 /// A step along the frontier is always worth taking if it reduces the squared error to this factor for at most this
 /// factor of time.
 const CHEAP: [f64; 2] = [0.6, 2.0];
@@ -202,7 +205,7 @@ impl Judge<'_> {
             file::write(&self.folder.join("pictures").join(format!("{}{end}", record.picture)), bytes)
         };
         write(".error.png", &png::encode_png(flip.width, flip.height, &map_rgba(&flip), false)?)?;
-        write(".worst.png", &around(&flip, [&self.truth.display.rgba, &display.rgba])?)?;
+        write(".worst.png", &around([&self.truth.display, display])?)?;
         Ok(Point {
             name: record.name.clone(),
             family: record.family,
@@ -371,9 +374,37 @@ fn drawing(reference: &Reference) -> String {
     reference.command.replace(&format!("samples={}", first.samples), &format!("samples={rung}"))
 }
 
-/// PNG of the reference and the picture around the worst pixel, side by side, enlarged four times.
-fn around(flip: &Comparison, pictures: [&Vec<[u8; 4]>; 2]) -> Result<Vec<u8>> {
-    let [wx, wy] = flip.worst.map(i64::from);
+/// Middle of the square of [`REGION`] pixels whose mean display values differ most between two pictures. Noise and
+/// fireflies of single pixels, which the largest FLIP error often shows, count little there.
+fn worst_region(pictures: [&Display; 2]) -> [i64; 2] {
+    let [width, height] = [pictures[0].width, pictures[0].height].map(|side| side as usize);
+    let [across, down] = [width, height].map(|side| REGION.min(side));
+    // Sums of the differences above and to the left of each pixel (summed-area table; Crow 1984).
+    let mut sums = vec![[0_i64; 3]; (width + 1) * (height + 1)];
+    let at = |x: usize, y: usize| y * (width + 1) + x;
+    for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+        let [a, b] = pictures.map(|picture| picture.rgba[y * width + x]);
+        sums[at(x + 1, y + 1)] = std::array::from_fn(|c| {
+            let [above, left, both] = [at(x + 1, y), at(x, y + 1), at(x, y)].map(|i| sums[i][c]);
+            above + left - both + i64::from(a[c]) - i64::from(b[c])
+        });
+    }
+    let difference = |&[x, y]: &[usize; 2]| -> i64 {
+        let corners = [at(x + across, y + down), at(x, y + down), at(x + across, y), at(x, y)];
+        (0..3)
+            .map(|c| corners.map(|i| sums[i][c]))
+            .map(|[all, left, above, both]| (all - left - above + both).abs())
+            .sum()
+    };
+    let squares =
+        (0..=height - down).step_by(STRIDE).flat_map(|y| (0..=width - across).step_by(STRIDE).map(move |x| [x, y]));
+    let [x, y] = squares.max_by_key(difference).unwrap_or_default();
+    [(x + across / 2) as i64, (y + down / 2) as i64]
+}
+
+/// The reference and a picture beside each other, four times as large, around the place where they differ most.
+fn around(pictures: [&Display; 2]) -> Result<Vec<u8>> {
+    let [wx, wy] = worst_region(pictures);
     let side = 2 * AROUND;
     let (width, height) = (2 * side * 4 + 8, side * 4);
     let mut rgba = Vec::with_capacity((width * height * 4) as usize);
@@ -383,11 +414,11 @@ fn around(flip: &Comparison, pictures: [&Vec<[u8; 4]>; 2]) -> Result<Vec<u8>> {
             let gap = x >= side * 4 && !right;
             let at = if right { x - side * 4 - 8 } else { x };
             let (px, py) = (wx - AROUND + at / 4, wy - AROUND + y / 4);
-            let inside = px >= 0 && py >= 0 && px < i64::from(flip.width) && py < i64::from(flip.height);
+            let inside = px >= 0 && py >= 0 && px < i64::from(pictures[0].width) && py < i64::from(pictures[0].height);
             let pixel = if gap || !inside {
                 [128, 128, 128, 255]
             } else {
-                let [r, g, b, _] = pictures[usize::from(right)][(py * i64::from(flip.width) + px) as usize];
+                let [r, g, b, _] = pictures[usize::from(right)].rgba[(py * i64::from(pictures[0].width) + px) as usize];
                 [r, g, b, 255]
             };
             rgba.extend_from_slice(&pixel);
@@ -399,6 +430,7 @@ fn around(flip: &Comparison, pictures: [&Vec<[u8; 4]>; 2]) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use etalon::optics::SplitMix64;
 
     fn record(name: &str, ms: &[f64], baseline_ms: &[f64]) -> Record {
         serde_json::from_value(serde_json::json!({
@@ -406,6 +438,25 @@ mod tests {
             "noise": null, "work": {}, "command": "", "image": "", "picture": name, "pair": null,
         }))
         .expect("a record")
+    }
+
+    #[test]
+    fn a_region_that_is_off_counts_more_than_noise() {
+        let (width, height) = (64_usize, 40_usize);
+        let mut random = SplitMix64::new(3);
+        let noisy: Vec<[u8; 4]> =
+            (0..width * height).map(|_| [random.between(60.0, 140.0) as u8, 100, 100, 255]).collect();
+        let mut shown: Vec<[u8; 4]> = vec![[100, 100, 100, 255]; width * height];
+        // A firefly, and a square that is off by less than the noise of a pixel.
+        shown[5 * width + 5] = [255; 4];
+        for (y, x) in (20..36).flat_map(|y| (40..56).map(move |x| (y, x))) {
+            shown[y * width + x][1] = 120;
+        }
+        let display = |rgba: &Vec<[u8; 4]>| Display { width: width as u32, height: height as u32, rgba: rgba.clone() };
+        assert_eq!(worst_region([&display(&noisy), &display(&shown)]), [48, 28]);
+        // A picture that is smaller than a square is one.
+        let small = Display { width: 3, height: 2, rgba: vec![[0; 4]; 6] };
+        assert_eq!(worst_region([&small, &small]), [1, 1]);
     }
 
     #[test]

@@ -20,8 +20,8 @@ use etalon::plan::{Knobs, Model};
 
 /// Default limit for the number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance, times
-/// the root of their number (measured: docs/cost.md).
+/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance,
+/// times the root of their number (measured: docs/cost.md).
 const OTHER_PIXELS: f64 = 3.0;
 
 /// Predicted time and error of a picture.

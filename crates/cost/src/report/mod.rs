@@ -16,6 +16,7 @@ use std::path::Path;
 use anyhow::Result;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use super::command::nearest_preset;
 use super::reference::NotMeasured;
 use super::table::{Family, Point, REFERENCE, Table};
 
@@ -82,7 +83,12 @@ fn title(point: &Point) -> String {
     match (point.family, point.name.strip_prefix("search: ")) {
         (Family::Search, Some("quickest")) => "fastest rung of every knob".to_owned(),
         (Family::Search, Some("exact without waste")) => "reference quality, useless rungs off".to_owned(),
-        (Family::Search, Some(step)) => format!("combination {}", step.trim_start_matches("step ")),
+        (Family::Search, Some(step)) => {
+            let (model, changed) = point.rungs().map(|knobs| nearest_preset(&knobs)).unwrap_or_default();
+            let knobs = if changed.len() == 1 { "knob" } else { "knobs" };
+            let number = step.trim_start_matches("step ");
+            format!("combination {number} ({model} with {} {knobs} changed)", changed.len())
+        }
         _ => point.name.clone(),
     }
 }
@@ -208,7 +214,7 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
                             "Each step applies the change with the best predicted gain per millisecond. It is kept if the error falls significantly. Where prediction and measurement differ, two knobs interact."
                         }, tables::search(table)))
                     }
-                    (folded("pictures", "Every picture", html! { "Each with its error map and its worst pixel." }, pictures::gallery(table)))
+                    (folded("pictures", "Every picture", html! { "Each with its error map and the place where it differs most." }, pictures::gallery(table)))
                     (folded("words", "Terms", html! { "Meaning of the terms on this page." }, words::list()))
                     (words::statements(table))
                 }

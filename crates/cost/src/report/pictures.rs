@@ -20,7 +20,7 @@ const GREY: u8 = 119;
 /// Largest number of pixels of an embedded picture.
 const MOST_PIXELS: u32 = 640 * 360;
 
-/// Size of the picture of the worst pixel.
+/// Size of the picture of the place that differs most.
 pub(super) const WORST: [u32; 2] = [328, 160];
 
 /// Size of the pictures for the layout, so that the page does not jump when they load.
@@ -28,13 +28,18 @@ pub(super) fn size(table: &Table) -> [u32; 2] {
     table.size
 }
 
-/// A picture as a data URL, halved until it has at most [`MOST_PIXELS`] pixels.
-pub(super) fn embedded(path: &Path) -> Result<String> {
+/// A picture, halved until it has at most [`MOST_PIXELS`] pixels.
+fn small(path: &Path) -> Result<Display> {
     let mut picture = read_display(path)?;
     while picture.width * picture.height > MOST_PIXELS {
         picture = halved(&picture);
     }
-    jpeg(&picture)
+    Ok(picture)
+}
+
+/// A picture as a data URL, with at most [`MOST_PIXELS`] pixels.
+pub(super) fn embedded(path: &Path) -> Result<String> {
+    jpeg(&small(path)?)
 }
 
 /// A picture at half the size: means of 2×2 pixels.
@@ -58,7 +63,7 @@ fn jpeg(picture: &Display) -> Result<String> {
     Ok(format!("data:image/jpeg;base64,{}", STANDARD.encode(bytes)))
 }
 
-/// Gallery of all pictures with error maps, worst pixels and commands.
+/// Gallery of all pictures with error maps, details and commands.
 pub(super) fn gallery(table: &Table) -> Markup {
     let [width, height] = size(table);
     html! {
@@ -81,7 +86,7 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
             div.three {
                 figure { img loading="lazy" width=(width) height=(height) src=(file(".png")) alt={ (title(point)) ": the picture" }; }
                 figure { img loading="lazy" width=(width) height=(height) src=(file(".error.png")) alt={ (title(point)) ": its error" }; }
-                figure { img.pixels loading="lazy" width=(WORST[0]) height=(WORST[1]) src=(file(".worst.png")) alt="The worst pixel: the reference on the left, the picture on the right"; figcaption { "worst pixel " (e.worst_pixel.x) ", " (e.worst_pixel.y) ": reference, picture" } }
+                figure { img.pixels loading="lazy" width=(WORST[0]) height=(WORST[1]) src=(file(".worst.png")) alt="Where it differs most: the reference on the left, the picture on the right"; figcaption { "where it differs most: reference, picture" } }
             }
             p.figures {
                 span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " renders)" }
@@ -100,7 +105,7 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
 /// where no change is significant.
 pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
     let Some(local) = table.points.iter().find(|point| point.name == "local") else { return Ok(None) };
-    let open = |name: &str| read_display(&pictures.join(format!("{name}.png")));
+    let open = |name: &str| small(&pictures.join(format!("{name}.png")));
     let (reference, base) = (open("reference")?, open(&local.picture)?);
     // Changes that are not significant would only show the noise of the reference.
     let others: Vec<&Point> = table
