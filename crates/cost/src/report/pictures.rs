@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use image::ExtendedColorType;
@@ -11,7 +11,7 @@ use maud::{Markup, html};
 
 use super::{COLOURS, command_line, digits, error, hex, percent, time, title, words};
 use crate::table::{Family, Point, REFERENCE, Table};
-use etalon::image::png::{Display, encode_png, over, read_display};
+use etalon::image::png::{Display, over, read_display};
 
 /// JPEG quality of embedded pictures; the folder `pictures` has lossless files.
 const QUALITY: u8 = 82;
@@ -142,10 +142,10 @@ pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
     let mut order: Vec<usize> = (0..others.len()).filter(|&i| gains[i] > 0.005 * total).collect();
     order.sort_by(|&a, &b| gains[b].total_cmp(&gains[a]));
     order.truncate(COLOURS.len() - 1);
-    let rgba: Vec<u8> = best
+    let rgba: Vec<[u8; 4]> = best
         .iter()
         .zip(&before)
-        .flat_map(|((after, index), before)| {
+        .map(|((after, index), before)| {
             let colour = order.iter().position(|i| i == index).map_or([40; 3], |place| COLOURS[place]);
             // Brightness is the fraction of the pixel's error that the change removes.
             let share = if *before > 0.0 { ((before - after) / before).sqrt().max(0.25) } else { 0.0 };
@@ -153,11 +153,7 @@ pub(super) fn causes(table: &Table, pictures: &Path) -> Result<Option<Markup>> {
             [r, g, b, 255]
         })
         .collect();
-    let map = format!(
-        "data:image/png;base64,{}",
-        STANDARD.encode(encode_png(base.width, base.height, &rgba, false).context("drawing causes")?)
-    );
-    let picture = jpeg(&base)?;
+    let [map, picture] = [jpeg(&Display { rgba, ..base })?, jpeg(&base)?];
     Ok(Some(html! {
         div.pair {
             figure { img src=(picture) width=(base.width) height=(base.height) alt="The picture of the preset local"; figcaption { "local" } }
