@@ -205,7 +205,7 @@ impl Agenda {
         let priced = priced.unwrap_or_else(|| super::reference::samples_within(plain_ms, most).min(16));
         let priced_rung = priced.to_string();
         let plain = set(&three_colours, "samples", &priced_rung)?;
-        let mut of_exact = without_paths(bench, states, &plain, reference)?;
+        let mut of_exact = without_paths(bench, states, &plain)?;
         for task in exact_changes {
             of_exact.push(Task { knobs: set(&task.knobs, "samples", &priced_rung)?, ..task });
         }
@@ -235,12 +235,9 @@ pub fn with_indirect(knobs: &Knobs, rung: &str) -> Option<Knobs> {
 }
 
 /// The reference's rungs with the indirect light of the presets without path tracing. A rung whose plan equals that of
-/// the rung before is skipped. A reference in bands has another limit than pictures in RGB, and judges none of them.
-fn without_paths(bench: &Bench<'_>, states: &States, plain: &Knobs, reference: &Knobs) -> Result<Vec<Task>> {
+/// the rung before is skipped.
+fn without_paths(bench: &Bench<'_>, states: &States, plain: &Knobs) -> Result<Vec<Task>> {
     let mut all: Vec<Task> = Vec::new();
-    if reference.colour.bands() > 0 {
-        return Ok(all);
-    }
     let Some(knob) = states.called_for().find(|knob| knob.name == "indirect") else { return Ok(all) };
     let mut before: Option<Plan> = None;
     for model in [Model::Recursive, Model::Local] {

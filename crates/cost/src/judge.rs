@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::agenda::Change;
-use super::difference::{ShownReference, Truth};
+use super::difference::{ShownReference, Truth, significant};
 use super::price::{Pair, PairedTimes, TimeNoise, price};
 use super::reference::display_of;
 use super::statistics::{Estimate, Interval, MANY, standard_errors};
@@ -30,6 +30,8 @@ const STRIDE: usize = 4;
 /// A step along the frontier is always worth taking if it reduces the squared error to this factor for at most this
 /// factor of time.
 const CHEAP: [f64; 2] = [0.6, 2.0];
+/// Largest ratio of the times of `balanced` and `quick`.
+pub const DEARER: f64 = 10.0;
 /// The reference itself is recommended as `exact` where no other point has an error below this multiple of its
 /// resolution.
 const FAR: f64 = 2.0;
@@ -136,7 +138,7 @@ impl Judge<'_> {
             let local = record.family == Family::Local;
             let more = match record.family {
                 Family::Local => Some(self.truth.shown.more_error(&displays[i], &displays[base])),
-                _ => (!points[i].is_path_traced()).then(|| self.without_paths(records, &displays, i)),
+                _ => (!points[i].is_path_traced()).then(|| self.without_paths(records, &displays, i, sure)),
             };
             let clock = clocks[usize::from(!local)];
             let [ms, baseline_ms] = in_the_middle([&record.ms, &record.baseline_ms], points[base].gpu_ms.median);
@@ -154,10 +156,11 @@ impl Judge<'_> {
         Ok(Judged { points, frontier, recommended, prices, standard_errors: sure })
     }
 
-    /// Squared difference of a picture without paths from the limit of the base `exact`, which is that of the
-    /// reference. It has no half buffers: what its few samples for each pixel add is the squared difference between
-    /// `local` with as many and with 64. That is taken away, and bounds the bias of what is left.
-    fn without_paths(&self, records: &[Record], displays: &[Display], i: usize) -> Estimate {
+    /// Squared difference of a picture without paths from the limit of the base `exact`. It has no half buffers, and is
+    /// compared with the reference. What its few samples for each pixel add is the squared difference between `local`
+    /// with as many and with 64; what RGB adds, where the reference has bands, is the price of the knob `colour`. Both
+    /// are taken away, and bound the bias of what is left.
+    fn without_paths(&self, records: &[Record], displays: &[Display], i: usize, sure: f64) -> Estimate {
         let found = self.truth.shown.error(&displays[i]);
         let local = |samples: &str| {
             let like = |record: &Record| match record.name.strip_prefix("local") {
@@ -167,11 +170,17 @@ impl Judge<'_> {
             };
             Some(&displays[records.iter().position(like)?])
         };
-        let of_samples = match (local(&records[i].knobs["samples"]), local("64")) {
-            (Some(few), Some(many)) => ShownReference::exact(many).error(few).mean,
-            _ => found.mean,
+        let of_samples = || Some(ShownReference::exact(local("64")?).error(local(&records[i].knobs["samples"])?).mean);
+        let bands = &self.reference.knobs["colour"];
+        let of_colour = || {
+            let is_price = |record: &&Record| record.name.strip_prefix("exact colour=") == Some(bands);
+            let (_, pair) = records.iter().find(is_price)?.pair.as_ref()?;
+            let Estimate { mean, deviation, .. } = significant(&pair.squares, sure)?.1;
+            Some(mean + 2.0 * deviation)
         };
-        Estimate { mean: found.mean - of_samples, bias: found.bias + of_samples, ..found }
+        let colour = if *bands == records[i].knobs["colour"] { Some(0.0) } else { of_colour() };
+        let others = of_samples().zip(colour).map_or(found.mean, |(samples, colour)| samples + colour);
+        Estimate { mean: found.mean - others, bias: found.bias + others, ..found }
     }
 
     /// Evaluates a picture of another program.
@@ -251,8 +260,8 @@ impl Judge<'_> {
 }
 
 /// Recommended settings from a frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]).
-/// `exact` is the most exact point, or the reference where no point comes close to it. `balanced` is the best
-/// [`compromise`] between both, or `quick` where there is none.
+/// `balanced` has the least error for at most [`DEARER`] times the time of `quick`. `exact` is the most exact point, or
+/// the reference where no point comes close to it.
 fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     let (time, error) = (|i: usize| points[i].gpu_ms.median, |i: usize| points[i].error());
     let mut all = frontier.to_vec();
@@ -273,24 +282,11 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     while let Some(next) = cheap(quick) {
         quick = next;
     }
-    let of = |i: usize| [time(i), error(i)];
-    let between: Vec<usize> = all.iter().copied().filter(|&i| time(i) > time(quick) && i != exact).collect();
-    let costs: Vec<[f64; 2]> = between.iter().map(|&i| of(i)).collect();
-    let balanced = compromise([of(quick), of(exact)], &costs).map_or(quick, |place| between[place]);
+    // Points of a frontier have less error the longer they take.
+    let affordable = |&i: &usize| time(i) <= DEARER * time(quick);
+    let balanced = all.iter().copied().rfind(affordable).unwrap_or(quick);
     let named = [("quick", quick), ("balanced", balanced), ("exact", exact)];
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()
-}
-
-/// The best compromise between a quick and an exact point, each a time and an error: of the ways in time from `quick`
-/// and in error to `exact`, as fractions of the whole ways in logarithms, the larger one is least (compromise
-/// programming; Zeleny 1973).
-fn compromise([quick, exact]: [[f64; 2]; 2], between: &[[f64; 2]]) -> Option<usize> {
-    let part = |from: f64, value: f64, to: f64| {
-        let [from, value, to] = [from, value, to].map(|x| x.max(1e-9).ln());
-        if from == to { 0.0 } else { (value - from) / (to - from) }
-    };
-    let regret = |[time, error]: [f64; 2]| part(quick[0], time, exact[0]).max(part(exact[1], error, quick[1]));
-    (0..between.len()).min_by(|&a, &b| regret(between[a]).total_cmp(&regret(between[b])))
 }
 
 /// Scales the interleaved times of a picture and its base so that the median of the base is `base_ms`, its median over
@@ -460,13 +456,30 @@ mod tests {
     }
 
     #[test]
-    fn a_compromise_is_neither_nearly_quick_nor_nearly_exact() {
-        // study:cornell at 128x72, milliseconds and percent.
-        let [quick, exact] = [[1.44, 9.545], [3132.0, 0.413]];
-        let between = [[1.73, 8.731], [4.15, 8.515], [58.3, 7.578], [63.6, 5.222], [343.0, 2.687], [1609.0, 1.25]];
-        assert_eq!(compromise([quick, exact], &between), Some(4));
-        assert_eq!(compromise([quick, exact], &between[..2]), Some(1));
-        assert_eq!(compromise([quick, exact], &[]), None);
+    fn settings_are_as_dear_as_they_may_be() {
+        let record = |name: &str| record(name, &[1.0], &[]);
+        let point = |name: &str, ms: f64, error: f64| {
+            let interval = |x: f64| serde_json::json!({ "median": x, "low": x, "high": x });
+            let mut point = serde_json::to_value(record(name)).expect("JSON");
+            let more = serde_json::json!({
+                "gpu_ms": interval(ms), "timed": 1, "error": interval(error), "flip_mean": 0.0, "flip_p95": 0.0,
+                "relmse": interval(0.0), "rmse": 0.0, "delta_e_mean": 0.0,
+                "worst_pixel": { "x": 0, "y": 0, "error": 0.0 },
+            });
+            point.as_object_mut().expect("a point").extend(more.as_object().expect("a point").clone());
+            serde_json::from_value::<Point>(point).expect("a point")
+        };
+        let named = |errors: &[(f64, f64)]| {
+            let mut points: Vec<Point> = errors.iter().map(|&(ms, error)| point("a", ms, error)).collect();
+            points.push(point(REFERENCE, 3132.0, 0.004));
+            let frontier: Vec<usize> = (0..points.len()).collect();
+            recommended(&points, &frontier).iter().map(|r| r.point).collect::<Vec<_>>()
+        };
+        // study:cornell and study:absorber at 128x72: the first step of absorber that is worth its time takes four
+        // times as long, and no step of cornell within ten times the time is cheap.
+        assert_eq!(named(&[(1.44, 0.09545), (1.73, 0.08731), (4.15, 0.08515), (58.3, 0.07578)]), [0, 2, 4]);
+        assert_eq!(named(&[(5.28, 0.06742), (19.64, 0.06582), (20.37, 0.02912)]), [0, 2, 3]);
+        assert_eq!(named(&[(8.15, 0.01881)]), [0, 0, 1]);
     }
 
     #[test]

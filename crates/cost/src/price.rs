@@ -209,8 +209,10 @@ fn verdict(price: &Price) -> String {
     let nearer = price.base != Family::Exact && price.error_told && error.median < 0.0;
     let seen = match price.brightness {
         Some(ratio) if (ratio - 1.0).abs() > BY_ROUNDING => format!(
-            "{seen}; the mean brightness changes by {:+.4} %, more than rounding can: one of the two rungs is wrong here",
-            100.0 * (ratio - 1.0)
+            "{seen}; the mean brightness changes by {:+.4} %, more than rounding can: one of the two rungs is wrong here, \
+             {} rather than the more exact one",
+            100.0 * (ratio - 1.0),
+            price.cheaper_rung()
         ),
         _ => seen,
     };

@@ -363,7 +363,7 @@ impl Price {
     }
 
     /// The less exact one of both rungs.
-    fn cheaper_rung(&self) -> &str {
+    pub(super) fn cheaper_rung(&self) -> &str {
         if self.to_more_exact() { &self.from } else { &self.to }
     }
 
@@ -424,8 +424,8 @@ pub struct Simplified<'a> {
     pub knob: &'a KnobState,
     /// Its rung in the point.
     pub rung: &'a str,
-    /// FLIP error, 0 to 1, that the rung causes here: 0 if it is not visible, `None` if it was not measured.
-    pub seen: Option<f64>,
+    /// What the rung loses here, if that was measured.
+    pub loss: Option<Loss>,
 }
 
 impl Simplified<'_> {
@@ -446,19 +446,37 @@ impl Display for Simplified<'_> {
     }
 }
 
-/// Largest visible difference (FLIP) that was measured between a rung and a more exact one with all other knobs alike;
-/// 0 if none was visible, `None` if no such pair was drawn. A rung that was not drawn loses what the next more exact
-/// one does that was. Pairs with this base count. If none of them reaches the knob's exact rung, those with the other
-/// base do too, but for pairs that differ in the noise of their paths alone.
-fn seen(prices: &[Price], knob: &Knob, rung: &str, base: Family) -> Option<f64> {
+/// What a rung loses against more exact ones.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Loss {
+    /// Largest visible difference (FLIP); 0 if none was visible.
+    pub flip: f64,
+    /// Largest error of display values 0 to 1 that a more exact rung takes away; 0 if none is significant.
+    pub error: f64,
+}
+
+/// The largest differences that were measured between a rung and more exact ones with all other knobs alike; `None` if
+/// no such pair was drawn. A rung that was not drawn loses what the next more exact one does that was. Pairs with this
+/// base count. If none of them reaches the knob's exact rung, those with the other base do too, but for pairs that
+/// differ in the noise of their paths alone.
+fn loss(prices: &[Price], knob: &Knob, rung: &str, base: Family) -> Option<Loss> {
     let place = knob.rungs.iter().position(|known| *known == rung)?;
+    let of_pair = |price: &Price| {
+        let nearer = if price.to_more_exact() && price.base == Family::Local { -1.0 } else { 1.0 };
+        let error = (nearer * price.shown_delta.median).max(0.0).sqrt();
+        Loss {
+            flip: if price.shows() { price.flip_between } else { 0.0 },
+            error: if price.error_told { error } else { 0.0 },
+        }
+    };
+    let most = |a: Loss, b: Loss| Loss { flip: a.flip.max(b.flip), error: a.error.max(b.error) };
     let pairs_of = |rung: &&str| {
         let pairs = prices.iter().filter(|price| price.knob == knob.name && price.cheaper_rung() == *rung);
         let (mut counted, others): (Vec<&Price>, Vec<&Price>) = pairs.partition(|price| price.base == base);
         if !counted.iter().any(|price| price.to == knob.exact || price.from == knob.exact) {
             counted.extend(others.into_iter().filter(|price| price.noise_ratio.is_none()));
         }
-        counted.into_iter().map(|price| if price.shows() { price.flip_between } else { 0.0 }).reduce(f64::max)
+        counted.into_iter().map(of_pair).reduce(most)
     };
     knob.rungs[place..].iter().find_map(pairs_of)
 }
@@ -467,15 +485,17 @@ fn seen(prices: &[Price], knob: &Knob, rung: &str, base: Family) -> Option<f64> 
 pub const REFERENCE: &str = "reference";
 
 impl Table {
-    /// The simplified knobs of a point: those that the scene calls for and whose rungs differ from the reference.
+    /// The simplified knobs of a point: those that the scene calls for and whose rungs are less exact than in the
+    /// reference.
     #[must_use]
     pub fn simplified<'a>(&'a self, point: &'a Point) -> Vec<Simplified<'a>> {
         let base = if point.is_path_traced() { Family::Exact } else { Family::Local };
-        let other = |knob: &'a KnobState| {
-            let rung = point.knobs.get(&knob.knob)?;
-            let exact = self.reference.knobs.get(&knob.knob);
-            let seen = || seen(&self.prices, Knob::named(&knob.knob)?, rung, base);
-            (Some(rung) != exact).then(|| Simplified { knob, rung, seen: seen() })
+        let other = |state: &'a KnobState| {
+            let knob = Knob::named(&state.knob)?;
+            let place = |rung: &String| knob.rungs.iter().position(|known| known == rung);
+            let (rung, exact) = (point.knobs.get(&state.knob)?, self.reference.knobs.get(&state.knob)?);
+            let loss = || loss(&self.prices, knob, rung, base);
+            (place(rung) < place(exact)).then(|| Simplified { knob: state, rung, loss: loss() })
         };
         self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect()
     }
@@ -634,16 +654,20 @@ mod tests {
         };
         let all = [
             price(Family::Local, ["shadows", "map", "off"], 0.02, true),
-            price(Family::Local, ["shadows", "map", "ray"], 0.01, true),
+            Price {
+                shown_delta: Interval { median: -0.0004, ..nothing },
+                ..price(Family::Local, ["shadows", "map", "ray"], 0.01, true)
+            },
             price(Family::Exact, ["shadows", "ray", "map"], 0.5, true),
             price(Family::Exact, ["normals", "f32", "oct16"], 0.03, false),
             price(Family::Local, ["indirect", "ambient", "off"], 0.01, true),
             price(Family::Exact, ["indirect", "path", "occlusion:16"], 0.2, true),
             noise,
         ];
-        let seen = |knob: &str, rung: &str, base: Family| seen(&all, Knob::named(knob).expect("a knob"), rung, base);
+        let loss = |knob: &str, rung: &str, base: Family| loss(&all, Knob::named(knob).expect("a knob"), rung, base);
+        let seen = |knob: &str, rung: &str, base: Family| loss(knob, rung, base).map(|loss| loss.flip);
         // A map differs from a ray; that no shadows differ from a map is no fault of the map.
-        assert_eq!(seen("shadows", "map", Family::Local), Some(0.01));
+        assert_eq!(loss("shadows", "map", Family::Local), Some(Loss { flip: 0.01, error: 0.02 }));
         assert_eq!(seen("shadows", "off", Family::Local), Some(0.02));
         assert_eq!(seen("shadows", "map", Family::Exact), Some(0.5));
         // Where only the other base has a pair, or one with the exact rung, it counts, if paths alone did not make it.

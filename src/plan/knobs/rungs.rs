@@ -424,7 +424,7 @@ macro_rules! area_about {
 
 knob! {
     Lights = "lights" {
-        /// Lights shine from points, with hard shadows; emissive surfaces are not sampled.
+        /// Lights shine from points, without the penumbras of their areas; emissive surfaces are not sampled.
         Points = "points",
         #[doc = area_about!("1 sample")]
         Area1 = "area:1",

@@ -1,6 +1,7 @@
 //! First sections of the page: recommended settings, what they simplify, how far to trust the measurements, and a
 //! comparison with the reference.
 
+use std::cmp::Ordering;
 use std::path::Path;
 
 use anyhow::Result;
@@ -8,8 +9,9 @@ use maud::{Markup, html};
 
 use super::pictures::{WORST, embedded, size};
 use super::{command_line, command_text, digits, error, percent, plain, time, title, words};
+use crate::judge::DEARER;
 use crate::statistics::Interval;
-use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Simplified, Table};
+use crate::table::{AtSize, Loss, Point, REFERENCE, RESOLVED, Recommended, Simplified, Table};
 use etalon::plan::rungs::Indirect;
 
 /// Time of a recommended point at the requested size, in words.
@@ -55,9 +57,10 @@ pub(super) fn lead(table: &Table) -> Markup {
     };
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
-        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on this device and has an " (words::link("error", "error"))
-        " of " (percent(point.error())) " of the range from black to white."
-        @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most) } ": " (most.about()) }
+        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on " (table.device.name) @if table.device.kind == "cpu" { ", a CPU," }
+        " and has an " (words::link("error", "error")) " of " (percent(point.error())) " of the range from black to white"
+        @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } "."
+        @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most.0) } (parenthesis(most.1)) ": " (most.0.about()) }
         @if !table.reference.converged {
             " The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(table.reference.resolution)) "."
         }
@@ -87,11 +90,13 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
                         }
                     }
                     table.facts { tbody {
-                        tr { th scope="row" { "time" } td { b { (takes(table, point)) } (spread(table, point)) @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
+                        tr { th scope="row" { (words::link("time", "time")) } td { b { (takes(table, point)) } (spread(table, point)) @if table.asked.is_some() { ", " (time(point.gpu_ms.median)) " at " (table.size[0]) "×" (table.size[1]) } } }
                         tr { th scope="row" { "error" } td { @if point.name == REFERENCE { "noise below " b { (percent(point.error())) } "; the other pictures are compared with the reference" } @else { (error(point)) } } }
                         tr { th scope="row" { "you lose" } td { (lost(table, point)) } }
                     } }
-                    @if point.name == REFERENCE && table.reference.rounds.len() > 1 { p.quiet { "A picture of about this quality:" } }
+                    @if point.name == REFERENCE && table.reference.rounds.len() > 1 {
+                        p.quiet { "The time is that of its " (table.reference.samples) " samples in " (table.reference.rounds.len()) " pictures. One picture of about this quality:" }
+                    }
                     (command_line(&command.replace(" --repeat 3", "")))
                 }
             })
@@ -100,6 +105,7 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     Ok(html! {
         section #settings {
             h2 { "Recommended settings" }
+            p { b { "quick" } " is the fastest setting that no cheap step improves; " b { "balanced" } " has the least error for at most " (plain(DEARER)) " times its time; " b { "exact" } " has the least error. An error in parentheses is what a more exact rung takes away; errors add by their squares." }
             div.settings { @for card in &cards { (card) } }
         }
     })
@@ -108,20 +114,26 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
 /// Largest number of simplifications of a recommended setting that are told with their sentences.
 const MOST: usize = 4;
 
-/// Simplified knobs of a point whose effect is visible here, the most visible first.
-fn visible<'a>(table: &'a Table, point: &'a Point) -> Vec<Simplified<'a>> {
-    let mut all = table.simplified(point);
-    all.retain(|choice| choice.seen.is_some_and(|flip| flip > 0.0));
-    all.sort_by(|a, b| b.seen.unwrap_or_default().total_cmp(&a.seen.unwrap_or_default()));
+/// Simplified knobs of a point whose effect is visible here, with their losses: the largest error first.
+fn visible<'a>(table: &'a Table, point: &'a Point) -> Vec<(Simplified<'a>, Loss)> {
+    let all = table.simplified(point).into_iter();
+    let mut all: Vec<_> =
+        all.filter_map(|choice| Some((choice, choice.loss.filter(|loss| loss.flip > 0.0)?))).collect();
+    all.sort_by(|(_, a), (_, b)| (b.error, b.flip).partial_cmp(&(a.error, a.flip)).unwrap_or(Ordering::Equal));
     all
 }
 
-/// The most visible simplification. Nothing where indirect light, often the largest one, was not measured.
-fn most_lost<'a>(table: &'a Table, point: &'a Point) -> Option<Simplified<'a>> {
+/// The simplification with the largest loss. Nothing where indirect light, often the largest one, was not measured.
+fn most_lost<'a>(table: &'a Table, point: &'a Point) -> Option<(Simplified<'a>, Loss)> {
     let indirect = Indirect::Path.choice().knob;
-    let unknown = |choice: &Simplified<'_>| choice.knob.knob == indirect && choice.seen.is_none();
+    let unknown = |choice: &Simplified<'_>| choice.knob.knob == indirect && choice.loss.is_none();
     let all_known = !table.simplified(point).iter().any(unknown);
     visible(table, point).first().copied().filter(|_| all_known)
+}
+
+/// An error that a more exact rung takes away, in parentheses.
+fn parenthesis(loss: Loss) -> String {
+    if loss.error > 0.0 { format!(" ({})", percent(loss.error)) } else { String::new() }
 }
 
 /// What a point loses: its visible simplifications in words, and the others folded.
@@ -129,7 +141,6 @@ fn lost(table: &Table, point: &Point) -> Markup {
     let visible = visible(table, point);
     let (told, rest) = visible.split_at(visible.len().min(MOST));
     let all = table.simplified(point);
-    let of = |seen: Option<f64>| all.iter().filter(move |choice| choice.seen == seen).copied().collect::<Vec<_>>();
     let folded = |list: &[Simplified<'_>], what: &str| {
         html! {
             @if !list.is_empty() {
@@ -140,14 +151,27 @@ fn lost(table: &Table, point: &Point) -> Markup {
             }
         }
     };
+    let with = |wanted: fn(Option<Loss>) -> bool| {
+        all.iter().filter(|choice| wanted(choice.loss)).copied().collect::<Vec<Simplified<'_>>>()
+    };
+    let rest: Vec<Simplified<'_>> = rest.iter().map(|(choice, _)| *choice).collect();
     html! {
-        @if all.is_empty() { "nothing" }
+        @if point.name == REFERENCE { "nothing; noise is left" }
+        @else if all.is_empty() { "nothing" }
         @else if told.is_empty() { "nothing that is visible here" }
-        @for choice in told { p { b { (choice) } ": " (choice.about()) } }
-        (folded(rest, "more that are visible"))
-        (folded(&of(Some(0.0)), "simplified, not visible here"))
-        (folded(&of(None), "simplified, not measured alone"))
+        @for (choice, loss) in told { p { b { (choice) } (parenthesis(*loss)) ": " (choice.about()) } }
+        (folded(&rest, "more that are visible"))
+        (folded(&with(|loss| loss.is_some_and(|loss| loss.flip == 0.0)), "simplified, not visible here"))
+        (folded(&with(|loss| loss.is_none()), "simplified, not compared with a more exact rung"))
     }
+}
+
+/// Command of the report. It has no folder, which decides nothing.
+fn report_command(table: &Table) -> String {
+    let [from, to] =
+        [table.size, table.asked.as_ref().map_or(table.size, |asked| asked.size)].map(|[w, h]| format!("{w}x{h}"));
+    let scene = table.command.replacen("etalon render", "etalon cost", 1).replacen(&from, &to, 1);
+    format!("{scene} --budget {:.0} -o FOLDER", table.budget_s)
 }
 
 /// Quality of the reference, device and warnings.
@@ -162,15 +186,16 @@ pub(super) fn trust(table: &Table) -> Markup {
                     "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more is significant. The difference between two pictures is known more precisely, because both are compared with the same noisy reference."
                 } @else {
                     "The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(r.resolution)) ". The target is "
-                    (plain(100.0 * RESOLVED)) " %. Run the same command again to improve this reference."
+                    (plain(100.0 * RESOLVED)) " %. Run the command of this report again to improve the reference."
                 }
                 " A question mark marks a difference that may be noise. In at most 1 of 100 runs is any statement of this page "
                 "wrong due to noise: intervals are two standard errors wide to each side, but a statement is made only from "
-                (digits(table.standard_errors)) " on, because the page makes some two hundred of them."
+                (digits(table.standard_errors)) " standard errors on, because the page makes some two hundred of them."
             }
             table.facts { tbody {
                 tr { th scope="row" { "scene" } td { (table.scene) ", " (table.size[0]) "×" (table.size[1]) } }
                 tr { th scope="row" { "device" } td { (table.device.name) " (" (table.device.kind) "), " (table.device.driver) " " (table.device.version) } }
+                tr { th scope="row" { "this report" } td { (command_text(&report_command(table))) } }
                 tr { th scope="row" { "reference" } td {
                     (r.samples) " samples per pixel" (rounds) ", " (time(r.gpu_ms)) " of GPU time; its noise is " (digits(r.own_flip)) " in " (words::link("flip", "FLIP"))
                 } }

@@ -89,7 +89,12 @@ fn title(point: &Point) -> String {
             let number = step.trim_start_matches("step ");
             format!("combination {number} ({model} with {} {knobs} changed)", changed.len())
         }
-        _ => point.name.clone(),
+        // `exact` is also a recommended setting.
+        _ => match point.name.strip_prefix("exact") {
+            Some("") => format!("reference's rungs, {} samples", point.knobs["samples"]),
+            Some(changed) => format!("reference's rungs,{changed}"),
+            None => point.name.clone(),
+        },
     }
 }
 
@@ -204,14 +209,14 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
                         }, chart::orders(table)))
                     }
                     (folded("passes", "GPU time per pass", html! {
-                        "GPU time of the frontier's pictures, divided by pass, with the wall time of the start: uploading, and compiling what no earlier picture compiled."
+                        "GPU time of the frontier's pictures, divided by pass, with the wall time of the start: uploading, and compiling what no earlier picture compiled. The time of a picture is scaled by its base's, those of passes are not."
                     }, tables::passes(table)))
                     (folded("knobs", "Knobs that the scene calls for", html! {
                         "The scene calls for a knob if its plan contains an effect of that knob. The other knobs change nothing here and are not measured."
                     }, tables::knobs(table)))
                     @if !table.search.is_empty() {
                         (folded("search", "The search for combinations", html! {
-                            "Each step applies the change with the best predicted gain per millisecond. It is kept if the error falls significantly. Where prediction and measurement differ, two knobs interact."
+                            "Each step applies the change with the best predicted gain per millisecond. It is kept if the error falls significantly. Where prediction and measurement differ, two knobs interact. Errors are by the reference as it was then."
                         }, tables::search(table)))
                     }
                     (folded("pictures", "Every picture", html! { "Each with its error map and the place where it differs most." }, pictures::gallery(table)))

@@ -89,7 +89,7 @@ fn shown(point: &Point, table: &Table, [width, height]: [u32; 2]) -> Markup {
                 figure { img.pixels loading="lazy" width=(WORST[0]) height=(WORST[1]) src=(file(".worst.png")) alt="Where it differs most: the reference on the left, the picture on the right"; figcaption { "where it differs most: reference, picture" } }
             }
             p.figures {
-                span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) " renders)" }
+                span { b { (time(point.gpu_ms.median)) } " (" (digits(point.gpu_ms.low)) " to " (digits(point.gpu_ms.high)) " ms, " (point.timed) (if point.timed == 1 { " render)" } else { " renders)" }) }
                 span { (words::link("error", "error")) " " (error(point)) }
                 span { (words::link("flip", "FLIP")) " " (digits(e.flip_mean)) ", 95th percentile " (digits(e.flip_p95)) }
                 span { (words::link("relmse", "√relMSE")) " " (percent(e.relmse.median.max(0.0).sqrt())) (noise.unwrap_or_default()) }

@@ -12,9 +12,24 @@ fn bought(price: &Price) -> f64 {
 
 /// Largest number of changes in a list.
 const MOST: usize = 6;
+/// Least fraction of the largest effect that counts as nearly the same.
+const NEARLY: f64 = 0.95;
 
 fn from_to(price: &Price) -> Markup {
     html! { b { (price.knob) } " " (price.from) " → " (price.to) }
+}
+
+/// For each knob of a list that begins with the largest effect, the cheapest change with nearly its effect.
+fn cheapest_of_each_knob<'a>(list: &[&'a Price]) -> Vec<&'a Price> {
+    let mut all: Vec<&Price> = Vec::new();
+    for most in list {
+        if all.iter().any(|price| price.knob == most.knob) {
+            continue;
+        }
+        let nearly = list.iter().filter(|price| price.knob == most.knob && bought(price) >= NEARLY * bought(most));
+        all.extend(nearly.min_by(|a, b| a.gpu_ms_delta.median.total_cmp(&b.gpu_ms_delta.median)));
+    }
+    all
 }
 
 /// Sections about the changes that matter and about useless rungs.
@@ -26,6 +41,7 @@ pub(super) fn matters(table: &Table) -> Markup {
     let mut worse: Vec<&Price> = of(Family::Local).filter(|p| p.error_told && p.shown_delta.median > 0.0).collect();
     for list in [&mut better, &mut worse] {
         list.sort_by(|a, b| bought(b).total_cmp(&bought(a)));
+        *list = cheapest_of_each_knob(list);
         list.truncate(MOST);
     }
     let wasted: Vec<&Price> = table.prices.iter().filter(|price| price.verdict.ends_with("wasted here")).collect();
@@ -41,16 +57,18 @@ pub(super) fn matters(table: &Table) -> Markup {
             @else { ", same time" }
         }
     };
-    let error = |name: &str| table.points.iter().find(|point| point.name == name).map(|point| percent(point.error()));
+    let error = |name: &str| {
+        table.points.iter().find(|point| point.name == name).map(|point| format!("{:.2} %", 100.0 * point.error()))
+    };
     let changes = |price: &Price| {
-        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) @if price.flip_between < INVISIBLE { ", not visible" } }
+        html! { (from_to(price)) ": " @if let (Some(base), Some(now)) = (error("local"), error(&price.point)) { (base) " → " (now) } (spent(price)) @if price.shown_delta.median > 0.0 && price.to_more_exact() { ", although it is more exact: " (price.from) " cancels another error" } @if price.flip_between < INVISIBLE { ", not visible" } }
     };
     html! {
         section #matters {
             h2 { "Changes that matter here" }
             @if better.is_empty() && worse.is_empty() { p { "No change of one knob of " em { "local" } " has a significant effect on the error." } }
             @if !better.is_empty() {
-                p { "Relative to " (words::link("preset", "local")) ", these changes lower the " (words::link("error", "error")) " (of " em { "local" } " → with the change):" }
+                p { "Relative to " (words::link("preset", "local")) ", these changes lower the " (words::link("error", "error")) " (of " em { "local" } " → with the change); of each knob the cheapest rung with nearly the largest effect:" }
                 ul { @for price in &better { li { (changes(price)) } } }
             }
             @if !worse.is_empty() {

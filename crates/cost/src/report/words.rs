@@ -8,11 +8,16 @@ use crate::table::Table;
 use etalon::lecture::{functions, statement};
 
 /// Id, term and definition.
-const WORDS: [(&str, &str, &str); 9] = [
+const WORDS: [(&str, &str, &str); 10] = [
     (
         "error",
         "error",
         "Root mean squared difference between the displayed values of a picture and of the exact picture, in percent of their range from black to white. 1 % is two and a half of the 256 steps of a display. The exact picture is the limit of the reference. The estimate is corrected for the noise of the reference; the interval is the 95 % confidence interval (two standard errors).",
+    ),
+    (
+        "time",
+        "time",
+        "GPU time of a picture: the median of several renders, each timed between renders of a base picture, whose times even out how fast the machine was. The range goes from the fastest to the slowest that the machine was during the run. Loading, uploading and compiling are not in it.",
     ),
     (
         "reference",
@@ -32,7 +37,7 @@ const WORDS: [(&str, &str, &str); 9] = [
     (
         "preset",
         "local, recursive, global",
-        "Presets of all knobs. local: direct light only. recursive: adds ray-traced shadows, reflections and refraction. global: path tracing with full indirect light.",
+        "Presets of all knobs. local: light of lamps with shadow maps, and the environment's as if nothing were in its way. recursive: adds ray-traced shadows, reflections and refraction. global: path tracing with full indirect light.",
     ),
     (
         "exact",
