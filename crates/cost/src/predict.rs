@@ -22,7 +22,7 @@ use etalon::plan::{Knobs, Model};
 pub const PIXELS: f64 = 160.0 * 90.0;
 /// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance,
 /// times the root of their number (measured: docs/cost.md).
-const OTHER_PIXELS: f64 = 3.0;
+const OTHER_PIXELS: f64 = 4.0;
 
 /// Predicted time and error of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -492,10 +492,17 @@ impl Table {
         let base = if point.is_path_traced() { Family::Exact } else { Family::Local };
         let other = |state: &'a KnobState| {
             let knob = Knob::named(&state.knob)?;
-            let place = |rung: &String| knob.rungs.iter().position(|known| known == rung);
             let (rung, exact) = (point.knobs.get(&state.knob)?, self.reference.knobs.get(&state.knob)?);
-            let loss = || loss(&self.prices, knob, rung, base);
-            (place(rung) < place(exact)).then(|| Simplified { knob: state, rung, loss: loss() })
+            // The samples of a reference of several pictures are no rung.
+            let number = |rung: &String| rung.parse::<u32>().ok();
+            let less_exact = match (number(rung), number(exact)) {
+                (Some(rung), Some(exact)) => rung < exact,
+                _ => {
+                    let place = |rung: &String| knob.rungs.iter().position(|known| known == rung);
+                    place(rung) < place(exact)
+                }
+            };
+            less_exact.then(|| Simplified { knob: state, rung, loss: loss(&self.prices, knob, rung, base) })
         };
         self.knobs.iter().filter(|knob| knob.called_for).filter_map(other).collect()
     }
