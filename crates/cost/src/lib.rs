@@ -14,6 +14,7 @@ pub mod difference;
 pub mod explain;
 pub mod forecast;
 pub mod judge;
+pub mod loss;
 pub mod measure;
 pub mod orders;
 pub mod pace;

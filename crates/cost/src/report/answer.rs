@@ -10,8 +10,9 @@ use maud::{Markup, html};
 use super::pictures::{WORST, embedded, size};
 use super::{command_line, command_text, digits, error, percent, plain, time, title, words};
 use crate::judge::DEARER;
+use crate::loss::{Loss, Simplified};
 use crate::statistics::Interval;
-use crate::table::{AtSize, Loss, Point, REFERENCE, RESOLVED, Recommended, Simplified, Table};
+use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Table};
 use etalon::plan::rungs::Indirect;
 
 /// Time of a recommended point at the requested size, in words.
