@@ -20,9 +20,11 @@ use etalon::plan::{Knobs, Model};
 
 /// Default limit for the number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// Relative scatter of an error in addition to noise, because few pixels sample edges and small objects by chance,
-/// times the root of their number (measured: docs/cost.md).
-const OTHER_PIXELS: f64 = 4.0;
+/// Relative scatter of an error in addition to noise, because few pixels sample edges, glows and small objects
+/// otherwise than many: in a picture of 64x36 pixels, and the power of the number of pixels with which it falls,
+/// between the share of edges (0.5) and of single pixels (1). Fitted to 64x36 and to 160x90 pixels (docs/cost.md).
+const OTHER_PIXELS: f64 = 0.15;
+const FALLS: f64 = 0.8;
 
 /// Predicted time and error of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,7 +56,7 @@ pub struct Trial<'a> {
 pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(Step<'_>)) -> Result<Vec<Prediction>> {
     let size = bench.settings.size;
     let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
-    let scatter = OTHER_PIXELS / pixels(few.settings.size).sqrt();
+    let scatter = OTHER_PIXELS * (pixels([64, 36]) / pixels(few.settings.size)).powf(FALLS);
     let growth = Growth::of(&few, size, &[Knobs::of(Model::Recursive), Knobs::of(Model::Local)])?;
     let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
