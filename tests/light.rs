@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 
 use etalon::frame::{Background, Renderer, Settings};
 use etalon::image::Picture;
+use etalon::optics::SplitMix64;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::{self, Environment};
 use etalon::scene::{LightKind, Material, Scene};
@@ -13,7 +14,7 @@ use etalon::study::shape::Shape;
 use etalon::study::{self, generate};
 use etalon::upload::view::View;
 use etalon_testing::gpu::{Gpu, bits, knobs, largest_difference, settings};
-use etalon_testing::made::{Made, SplitMix64, at, lambert, unlit};
+use etalon_testing::made::{Made, at, lambert, unlit};
 use glam::{DAffine3, DVec3, Vec3};
 
 const SIZE: [u32; 2] = [64, 36];

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
+use etalon::optics::SplitMix64;
 use etalon::optics::Tier;
 use etalon::plan::{Architecture, Knobs, Model};
 use etalon::scene::environment::Environment;
@@ -14,7 +15,7 @@ use etalon::study::shape::Shape;
 use etalon::transport::emitters::{EmitterSource, Emitters};
 use etalon::transport::light_hierarchy::LightHierarchy;
 use etalon_testing::gpu::{Gpu, bits, spread};
-use etalon_testing::made::{Made, SplitMix64, at, lambert, orthographic};
+use etalon_testing::made::{Made, at, lambert, orthographic};
 use etalon_testing::probe::evaluate;
 use glam::{DAffine3, DVec3};
 

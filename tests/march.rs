@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use etalon::frame::Settings;
+use etalon::optics::SplitMix64;
 use etalon::plan::rungs::Quadrature;
 use etalon::plan::{Attenuation, Facts, Knobs, Model, Plan, Surroundings};
 use etalon::scene::canonical::CanonicalForm;
@@ -13,7 +14,7 @@ use etalon::scene::{Camera, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, knobs, settings};
-use etalon_testing::made::{Made, SplitMix64, at, lambert, perspective, unlit};
+use etalon_testing::made::{Made, at, lambert, perspective, unlit};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 fn marching(size: [u32; 2], more: &[&str]) -> Settings {

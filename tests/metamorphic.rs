@@ -1,11 +1,11 @@
 //! What must not change the picture: units, place, the order of triangles, and which way the world is turned.
 
 use etalon::image::Picture;
+use etalon::optics::SplitMix64;
 use etalon::scene::{LightKind, Scene};
 use etalon::study;
 use etalon::study::generate::{self, at_scale};
 use etalon_testing::gpu::{Gpu, bits, settings};
-use etalon_testing::made::SplitMix64;
 use glam::{DAffine3, DVec3};
 
 const SIZE: [u32; 2] = [96, 54];

@@ -4,12 +4,12 @@
 
 use etalon::frame::Settings;
 use etalon::image::Picture;
+use etalon::optics::SplitMix64;
 use etalon::plan::{Knobs, Model};
 use etalon::scene::{LightKind, Scene};
 use etalon::study;
 use etalon::study::generate::at_scale;
 use etalon_testing::gpu::{Gpu, bits};
-use etalon_testing::made::SplitMix64;
 use glam::DVec3;
 
 const SIZE: [u32; 2] = [96, 54];

@@ -70,7 +70,7 @@ const PATTERNS: usize = 60;
 /// Balls and boxes that shine, all on the side z > 0.
 fn patterns() -> Made {
     let mut made = Made::new("patterns");
-    let mut random = etalon_testing::made::SplitMix64::new(11);
+    let mut random = etalon::optics::SplitMix64::new(11);
     for i in 0..PATTERNS {
         let color = [0; 3].map(|_| random.between(0.1, 3.0) as f32);
         let glow = Material { emissive: color, specular: 0.0, ..lambert([0.0; 3]) };

@@ -77,7 +77,7 @@ fn without(scene: &Scene, which: impl Fn(&Material) -> bool) -> Scene {
 /// behind a blended pane. The smooth metal emits some light of its own; what a coat covers would be weakened by it.
 fn crowd() -> Made {
     let mut made = Made::new("crowd");
-    let mut random = etalon_testing::made::SplitMix64::new(5);
+    let mut random = etalon::optics::SplitMix64::new(5);
     let coated = Material { clearcoat: 1.0, ..shining([0.0; 3]) };
     let kinds = [
         glass(1.5),

@@ -8,6 +8,7 @@ use std::sync::{Arc, OnceLock};
 use etalon::frame::{Background, Part, Renderer, Settings};
 use etalon::gpu::Compiled;
 use etalon::image::Picture;
+use etalon::optics::SplitMix64;
 use etalon::plan::{EffectState, Facts, ForcedEffects, Knobs, Plan, Surroundings};
 use etalon::scene::canonical::canonicalise;
 use etalon::scene::environment::Environment;
@@ -18,7 +19,7 @@ use etalon::scene::{AlphaMode, AmbientLight, Camera, Image, LightKind, Material,
 use etalon::study::shape::Shape;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::{Gpu, bits};
-use etalon_testing::made::{Made, SplitMix64, at, lambert, orthographic, perspective, unlit};
+use etalon_testing::made::{Made, at, lambert, orthographic, perspective, unlit};
 use glam::DVec3;
 
 const SIZE: [u32; 2] = [16, 16];

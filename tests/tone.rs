@@ -6,11 +6,12 @@ use ash::vk;
 use etalon::frame::{Background, NEUTRAL_GREY, Settings};
 use etalon::gpu::{Buffer, Frame, Image, ImageDesc};
 use etalon::image::tone::{ToneMap, ViewTransform, desaturated, quantise, srgb_decode, srgb_encode};
+use etalon::optics::SplitMix64;
 use etalon::pass::tonemap::{Counts, Display, tonemap};
 use etalon::scene::LightKind;
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, settings};
-use etalon_testing::made::{Made, SplitMix64, lambert, unlit};
+use etalon_testing::made::{Made, lambert, unlit};
 use glam::{DAffine3, DVec3};
 
 const CURVES: [ToneMap; 5] = [ToneMap::Linear, ToneMap::Reinhard, ToneMap::Aces, ToneMap::Agx, ToneMap::KhronosNeutral];

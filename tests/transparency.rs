@@ -3,11 +3,12 @@
 
 use etalon::frame::{Background, Settings};
 use etalon::image::Picture;
+use etalon::optics::SplitMix64;
 use etalon::scene::{AlphaMode, Camera, Image, LightKind, Material, Sampler, Scene, TextureRef};
 use etalon::study;
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, bits, knobs, settings};
-use etalon_testing::made::{Made, SplitMix64, at, lambert, pane, unlit};
+use etalon_testing::made::{Made, at, lambert, pane, unlit};
 use glam::{Affine2, DAffine3, DVec3};
 
 const SIZE: [u32; 2] = [80, 45];

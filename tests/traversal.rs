@@ -1,13 +1,14 @@
 //! The traversal alone: what rays meet, by three ways through the tree and by brute force in f64, and that a ray
 //! neither meets the surface it leaves nor slips out of a closed one, at any scale.
 
+use etalon::optics::SplitMix64;
 use etalon::pass::trace_rays::{Hit, Mode, Ray, Tracer};
 use etalon::scene::Scene;
 use etalon::study::shape::Shape;
 use etalon::transport::bvh::Bvh;
 use etalon::upload::rays::Traversal;
 use etalon_testing::gpu::Gpu;
-use etalon_testing::made::{Made, SplitMix64, at, lambert};
+use etalon_testing::made::{Made, at, lambert};
 use glam::{DAffine3, DVec3, Vec3};
 
 const WAYS: [Traversal; 3] = [Traversal::Links16, Traversal::Links32, Traversal::Stack];

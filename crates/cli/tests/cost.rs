@@ -94,7 +94,8 @@ fn a_run_is_what_its_commands_draw() {
         let picture = format!("data-name=\"{}\"", point["picture"].as_str().expect("a name"));
         assert!(page.contains(&picture) || name == "reference", "{name}");
     }
-    // What a setting loses is told in words; noise of paths is no loss of a picture without paths.
+    // The cards describe what each setting loses. `light-sampler` changes only the noise of paths, and no card of a
+    // picture without paths lists it.
     let settings = page.split("id=\"trust\"").next().expect("a beginning");
     assert!(settings.contains("you lose") && settings.contains("What you lose most by is"), "{settings:.2000}");
     assert!(!settings.contains("<b>light-sampler="), "{settings:.2000}");

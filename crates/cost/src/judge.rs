@@ -138,7 +138,7 @@ impl Judge<'_> {
             let local = record.family == Family::Local;
             let more = match record.family {
                 Family::Local => Some(self.truth.shown.more_error(&displays[i], &displays[base])),
-                _ => (!points[i].is_path_traced()).then(|| self.without_paths(records, &displays, i, sure)),
+                _ => (!points[i].is_path_traced()).then(|| self.error_without_paths(records, &displays, i, sure)),
             };
             let clock = clocks[usize::from(!local)];
             let [ms, baseline_ms] = in_the_middle([&record.ms, &record.baseline_ms], points[base].gpu_ms.median);
@@ -160,7 +160,7 @@ impl Judge<'_> {
     /// compared with the reference. What its few samples for each pixel add is the squared difference between `local`
     /// with as many and with 64; what RGB adds, where the reference has bands, is the price of the knob `colour`. Both
     /// are taken away, and bound the bias of what is left.
-    fn without_paths(&self, records: &[Record], displays: &[Display], i: usize, sure: f64) -> Estimate {
+    fn error_without_paths(&self, records: &[Record], displays: &[Display], i: usize, sure: f64) -> Estimate {
         let found = self.truth.shown.error(&displays[i]);
         let local = |samples: &str| {
             let like = |record: &Record| match record.name.strip_prefix("local") {

@@ -41,7 +41,7 @@ fn loss(prices: &[Price], knob: &Knob, rung: &str, base: Family) -> Option<Loss>
     knob.rungs[place..].iter().find_map(pairs_of)
 }
 
-/// A knob of a point that is on another rung than in the reference.
+/// A knob of a point whose rung is less exact than in the reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Simplified<'a> {
     /// The knob.

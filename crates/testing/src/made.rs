@@ -1,6 +1,5 @@
 //! Small scenes built in code.
 
-pub use etalon::optics::SplitMix64;
 use etalon::scene::{AlphaMode, Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
 use etalon::study::shape::Shape;
 use glam::{DAffine3, DMat3, DVec3};

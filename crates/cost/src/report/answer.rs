@@ -61,7 +61,7 @@ pub(super) fn lead(table: &Table) -> Markup {
         "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on " (table.device.name) @if table.device.kind == "cpu" { ", a CPU," }
         " and has an " (words::link("error", "error")) " of " (percent(point.error())) " of the range from black to white"
         @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } "."
-        @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most.0) } (parenthesis(most.1)) ": " (most.0.about()) }
+        @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most.0) } (in_parentheses(most.1)) ": " (most.0.about()) }
         @if !table.reference.converged {
             " The " (words::link("reference", "reference")) " is still noisy: do not trust differences below " (percent(table.reference.resolution)) "."
         }
@@ -112,7 +112,7 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     })
 }
 
-/// Largest number of simplifications of a recommended setting that are told with their sentences.
+/// Largest number of losses that a card describes; the card folds the others.
 const MOST: usize = 4;
 
 /// Simplified knobs of a point whose effect is visible here, with their losses: the largest error first.
@@ -133,7 +133,7 @@ fn most_lost<'a>(table: &'a Table, point: &'a Point) -> Option<(Simplified<'a>, 
 }
 
 /// An error that a more exact rung takes away, in parentheses.
-fn parenthesis(loss: Loss) -> String {
+fn in_parentheses(loss: Loss) -> String {
     if loss.error > 0.0 { format!(" ({})", percent(loss.error)) } else { String::new() }
 }
 
@@ -160,7 +160,7 @@ fn lost(table: &Table, point: &Point) -> Markup {
         @if point.name == REFERENCE { "nothing; noise is left" }
         @else if all.is_empty() { "nothing" }
         @else if told.is_empty() { "nothing that is visible here" }
-        @for (choice, loss) in told { p { b { (choice) } (parenthesis(*loss)) ": " (choice.about()) } }
+        @for (choice, loss) in told { p { b { (choice) } (in_parentheses(*loss)) ": " (choice.about()) } }
         (folded(&rest, "more that are visible"))
         (folded(&with(|loss| loss.is_some_and(|loss| loss.flip == 0.0)), "simplified, not visible here"))
         (folded(&with(|loss| loss.is_none()), "simplified, not compared with a more exact rung"))
