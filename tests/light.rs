@@ -282,12 +282,14 @@ fn more_lights_than_a_loop_can_run_over_are_refused() {
             *range = Some(100.0);
         }
     }
-    assert!(Renderer::new(&gpu.device, listed.clone(), None, settings([8, 8])).is_err(), "30,001 listed lights");
+    let refuses = gpu.device.limits_loops();
+    let made = Renderer::new(&gpu.device, listed.clone(), None, settings([8, 8]));
+    assert_eq!(made.is_err(), refuses, "30,001 listed lights");
     listed.lights.remove(0);
     let error = against_all_lights(&gpu, &listed, true, [9, 7]);
     eprintln!("30,000 listed lights: {error:e}");
     assert!(error < 30_000.0 * 2.0_f64.powi(-24), "{error:e}");
-    for count in [60_001, 70_000] {
+    for count in [60_001, 70_000].into_iter().filter(|_| refuses) {
         let Err(error) = Renderer::new(&gpu.device, with(count), None, settings([8, 8])) else {
             panic!("{count} lights are drawn on a software device");
         };
@@ -328,6 +330,9 @@ fn more_lights_than_the_loops_of_rays_allow_are_an_error() {
         assert!((f64::from(pixel[1]) - sum).abs() <= 1e-4 * sum, "pixel {i}: {} {sum}", pixel[1]);
     }
     assert!(all.0.reflection > 0 && all.0.shadow > 10_000);
+    if !gpu.device.limits_loops() {
+        return;
+    }
     let error = shot(0, 20_000).map(|_| ()).expect_err("20,000 rays to lights at one surface").to_string();
     assert!(error.contains("(20000 lights") && error.contains("shadows=map"), "{error}");
 }

@@ -535,8 +535,10 @@ fn a_ball_of_nothing_is_invisible_and_so_is_its_shadow() {
             );
             assert!(rendered.work.refraction > 1000);
             // Seen through the ball a surface is hit by a ray, 1e-6 m beside where the G-buffer has it, and its colours
-            // are no halves: edges may fall to the other side in a few pixels of a few hundred along edges.
-            assert!(worst < 2e-5 && off <= 8, "{camera}, {fresnel}: {worst:e}, {off}");
+            // are no halves: edges may fall to the other side in a few pixels of a few hundred along edges. Where
+            // vertices are snapped, the G-buffer has it up to 2^-8.5 of a pixel beside, 1e-4 m at 5 m.
+            let close = if gpu.device.snap_pixels() > 0.0 { 1e-4 } else { 2e-5 };
+            assert!(worst < close && off <= 8, "{camera}, {fresnel}: {worst:e}, {off}");
         }
     }
 }

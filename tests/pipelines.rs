@@ -1,9 +1,9 @@
 //! Pipelines are made while the passes before run, but not under validation: the picture is the same.
 
 use etalon::frame::{Renderer, Settings};
-use etalon::gpu::{Device, DeviceChoice};
+use etalon::gpu::Device;
 use etalon::plan::Knobs;
-use etalon_testing::gpu::Gpu;
+use etalon_testing::gpu::{Gpu, choice};
 
 /// Many devices, one after the other, each of which makes all pipelines of two scenes anew.
 #[test]
@@ -17,7 +17,7 @@ fn a_frame_that_waits_for_its_pipelines_is_the_same() {
         let settings = Settings { size: [64, 36], knobs, ..Settings::default() };
         let (whole, _) = gpu.shot(&scene, None, settings.clone());
         for round in 0..ROUNDS {
-            let device = Device::open(&DeviceChoice::Cpu, false).expect("the software device");
+            let device = Device::open(&choice(), false).expect("the device");
             let mut renderer = Renderer::new(&device, scene.clone(), None, settings.clone()).expect("a renderer");
             let piecewise = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
             assert!(piecewise.display == whole.display, "{study}, round {round}");

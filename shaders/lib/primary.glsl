@@ -38,6 +38,14 @@ HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
     return hit_point_of(Hit(0.0, leaf, t.weights.y / whole, t.weights.z / whole), p_bvh, vec3(0.0));
 }
 
+// Moves a surface to where its pixel's ray meets its triangle: rays leave from there.
+HitPoint put_on_triangle(inout Surface s, uint leaf, vec3 direction) {
+    HitPoint point = on_triangle(leaf, s.p_bvh, direction);
+    s.p_bvh = point.p;
+    s.face = point.face;
+    return point;
+}
+
 // With `exact_normals` the normals are those of the triangle, unless a normal map has changed them: for rays that leave the
 // surface. Lighting at the surface uses the stored normals, which do not depend on whether the scene calls for rays.
 Primary primary_surface(ivec2 pixel, bool exact_normals) {
@@ -60,16 +68,13 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
     Material m = material_at(material);
     vec3 p_rel = POSITIONS && r.drawn ? stored_position(pixel_index(pixel)) : rel_from_pixel(camera, pixel, r.drawn ? z : 1.0);
     Surface s = surface_from_texels(material, m, t, n, n_coat, -view_direction(camera, pixel), p_rel);
-    vec3 p_bvh = p_rel + trace_terms.bvh_from_rel;
-    s.p_bvh = p_bvh;
+    s.p_bvh = p_rel + trace_terms.bvh_from_rel;
     s.n_triangle = unit_from_octahedral(octahedral.zw);
     s.media = trace_terms.camera_media;
     if (STORED_TRIANGLES) {
         uint leaf = r.drawn ? leaf_places[r.drawn ? imageLoad(triangles, pixel).x : 0u] : NO_TRIANGLE;
         if (leaf != NO_TRIANGLE) {
-            HitPoint point = on_triangle(leaf, p_bvh, view_direction(camera, pixel));
-            s.p_bvh = point.p;
-            s.face = point.face;
+            HitPoint point = put_on_triangle(s, leaf, view_direction(camera, pixel));
             if (exact_normals) {
                 float side = dot(point.n, view_direction(camera, pixel)) <= 0.0 ? 1.0 : -1.0;
                 s.n_triangle = side * point.n;

@@ -14,6 +14,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 #include "lib/bent_view.glsl"
 #include "lib/instances.glsl"
 #include "lib/lighting.glsl"
+#include "lib/primary.glsl"
 #include "lib/screen.glsl"
 #include "lib/work_count.glsl"
 #include "lib/work_tile.glsl"
@@ -92,6 +93,10 @@ void main() {
         vec3 p = rel_from_pixel(camera, pixel, uintBitsToFloat(nodes[at + 1]));
         Surface s = surface_from_texels(word & 0xffffu, m, t, n, n_coat, -direction, p);
         s.p_bvh = p + trace_terms.bvh_from_rel;
+        if (STORED_TRIANGLES) {
+            uint leaf = leaf_places[nodes[at + 3]];
+            if (leaf != NO_TRIANGLE) put_on_triangle(s, leaf, direction);
+        }
         s.media = trace_terms.camera_media;
         float transmission = m.transmission * t.transmission;
         float scale = t.thickness * instances[nodes[at + 2]].scale;

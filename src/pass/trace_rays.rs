@@ -95,10 +95,13 @@ impl Tracer {
         self.rays.write_fixed();
         let bytes = std::mem::size_of_val(rays) as u64;
         let format = vk::Format::R32G32B32A32_UINT;
-        let mut input = Buffer::texels(&self.device, "rays", bytes, Place::Upload, format)?;
-        input.write(bytemuck::cast_slice(rays));
-        let bytes = std::mem::size_of::<Hit>() as u64 * rays.len() as u64;
-        let output = Buffer::new(&self.device, "hits", bytes, Place::Readback)?;
+        // Copies: a GPU would read the host's memory for each ray, and its bus would set the pace.
+        let mut sent = Buffer::new(&self.device, "rays of the host", bytes, Place::Upload)?;
+        sent.write(bytemuck::cast_slice(rays));
+        let input = Buffer::texels(&self.device, "rays", bytes, Place::Device, format)?;
+        let hits_bytes = std::mem::size_of::<Hit>() as u64 * rays.len() as u64;
+        let output = Buffer::new(&self.device, "hits", hits_bytes, Place::Device)?;
+        let received = Buffer::new(&self.device, "hits of the host", hits_bytes, Place::Readback)?;
         let per_group = if mode.pairs { 128 } else { 64 };
         let blocks = (rays.len() as u32).div_ceil(per_group).div_ceil(32);
         let TraceConstants { traversal, octants, .. } = self.rays.constants;
@@ -115,17 +118,21 @@ impl Tracer {
         for round in 0..repeats {
             let mut frame = Frame::of(&self.device, vec![scene.bind(entries())]);
             self.rays.reset(&mut frame);
+            if round == 0 {
+                frame.copy_buffer("send rays", &sent, &input, bytes);
+            }
             let bind = trace_rays::Bind { rays: &input, hits: &output };
             let push = trace_rays::Push { count: rays.len() as u32, blocks };
             frame.compute("rays", &bind, &constants, &push, [blocks * 32, 1, 1])?;
             if round + 1 == repeats {
-                frame.read_back(&output);
+                frame.copy_buffer("receive hits", &output, &received, hits_bytes);
+                frame.read_back(&received);
                 frame.read_back(&self.rays.counts);
             }
             let passes = frame.finish()?;
             times.extend(passes.iter().filter(|p| p.name == "rays").map(|p| p.ms));
         }
-        let hits = output.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
+        let hits = received.read(|all| bytemuck::pod_collect_to_vec(&all[..hits_bytes as usize]));
         Ok((hits, self.rays.counted(), times))
     }
 }

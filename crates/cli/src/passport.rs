@@ -59,14 +59,14 @@ pub fn run(args: &PassportArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
         account(&passport, whole)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let mut scope = Scope::default();
+    let device = Device::open(&args.device.choice(), args.device.validate)?;
+    let mut scope = Scope::of(&device);
     if !args.only.is_empty() {
         scope.sections = args.only.clone();
     }
     if !args.scene.is_empty() {
         scope.scenes = args.scene.iter().map(|name| format!("study:{name}")).collect();
     }
-    let device = Device::open(&args.device.choice(), args.device.validate)?;
     let steps = Steps::new(args.progress, quiet);
     let passport = measure(&device, &scope, &mut |step| steps.step(step, 1))?;
     drop(steps);

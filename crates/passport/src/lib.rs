@@ -64,8 +64,10 @@ pub struct Scope {
     pub scenes: Vec<String>,
     /// Size of pictures in pixels.
     pub size: [u32; 2],
-    /// Bytes that are copied and loaded.
+    /// Bytes that are copied and loaded: a multiple of 2^18.
     pub bytes: u64,
+    /// Size of the pictures whose rays are timed.
+    pub rays_at: [u32; 2],
     /// Milliseconds up to which dispatches are tried.
     pub dispatch_ms: f64,
 }
@@ -79,8 +81,26 @@ impl Default for Scope {
             scenes: etalon::study::NAMES.iter().map(|name| format!("study:{name}")).collect(),
             size: [64, 36],
             bytes: 64 << 20,
+            rays_at: [160, 90],
             dispatch_ms: 500.0,
         }
+    }
+}
+
+impl Scope {
+    /// The default scope, with speeds by what fills a GPU where the device is one: ten times the 50 MB of the largest
+    /// cache known (NVIDIA H100), within a sixteenth of the largest heap, and more pixels than it has threads
+    /// (270,336).
+    #[must_use]
+    pub fn of(device: &Arc<Device>) -> Self {
+        let mut scope = Self::default();
+        if !device.is_software() {
+            let heap = Capabilities::of(device).heaps.into_iter().max().unwrap_or(0);
+            let most = (512 << 20).min(heap / 16).min(device.max_storage_bytes());
+            scope.bytes = most.max(scope.bytes) & !((1 << 18) - 1);
+            scope.rays_at = [1280, 720];
+        }
+        scope
     }
 }
 
@@ -185,7 +205,7 @@ pub fn measure(device: &Arc<Device>, scope: &Scope, progress: &mut dyn FnMut(&st
                 found.map(|found| passport.pictures = Some(found))
             }
             Section::Speed => {
-                let found = speed::measure(device, scope.bytes, scenes[0], RAYS_AT, scope.dispatch_ms);
+                let found = speed::measure(device, scope.bytes, scenes[0], scope.rays_at, scope.dispatch_ms);
                 found.map(|found| passport.speed = Some(found))
             }
         };
@@ -201,8 +221,6 @@ pub fn measure(device: &Arc<Device>, scope: &Scope, progress: &mut dyn FnMut(&st
     Ok(passport)
 }
 
-/// Size of the pictures whose rays are timed.
-const RAYS_AT: [u32; 2] = [160, 90];
 /// Beginning of the promise that a section can be measured.
 const FAILS: &str = "can be measured: ";
 

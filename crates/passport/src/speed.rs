@@ -18,7 +18,7 @@ use crate::shader::{load, spin};
 /// Loads of one invocation.
 const LOADS: u32 = 16;
 /// Columns of the image that is loaded from.
-const COLUMNS: u32 = 1024;
+const COLUMNS: u32 = 4096;
 /// Submissions that are timed.
 const SUBMISSIONS: usize = 100;
 

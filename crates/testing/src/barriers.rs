@@ -25,13 +25,18 @@ fn errors_of<T>(
 }
 
 /// Asserts that synchronization validation reports no hazard in a frame with its derived barriers, and reports one in
-/// the same frame without them. `make` creates the resources, and `describe` the frame.
+/// the same frame without them. `make` creates the resources, and `describe` the frame. It proves nothing on a GPU,
+/// where every pass that has not been timed yet is a submission of its own, and says so.
 ///
 /// # Panics
 /// Validation reports otherwise.
 pub fn are_needed<T>(name: &str, make: impl Fn(&Gpu) -> T, describe: impl for<'a> Fn(&'a T, &'a Gpu) -> Frame<'a>) {
     let clean = errors_of(false, &make, &describe);
     assert!(clean.is_empty(), "{name}, with barriers: {clean:?}");
+    if !Gpu::alone().device.is_software() {
+        eprintln!("{name}: not proven, the passes are submissions of their own");
+        return;
+    }
     let hazards = errors_of(true, &make, &describe);
     assert!(hazards.iter().any(|text| text.contains("SYNC-HAZARD")), "{name}, without barriers: {hazards:?}");
 }

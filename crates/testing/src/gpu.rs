@@ -13,8 +13,8 @@ use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
 use etalon::upload::view::View;
 
-/// A device with validation, as a rule the software device, shared by the tests of a program
-/// (`crates/vulkan/src/open.rs`).
+/// A device with validation, shared by the tests of a program (`crates/vulkan/src/open.rs`): the software device, or
+/// the one that the environment variable `ETALON_TEST_DEVICE` names as `--device` does (`gpu`, an index, a name).
 pub struct Gpu {
     /// The device.
     pub device: Arc<Device>,
@@ -70,7 +70,7 @@ impl Gpu {
     }
 
     fn opened(place: Place, open: impl FnOnce(&DeviceChoice, bool) -> anyhow::Result<Arc<Device>>) -> Self {
-        match open(&DeviceChoice::Cpu, true) {
+        match open(&choice(), true) {
             Ok(device) => Self { device, expects_errors: false, _place: place },
             Err(error) => panic!("these tests need lavapipe and the Khronos validation layer: {error:#}"),
         }
@@ -108,6 +108,13 @@ impl Gpu {
         let (aovs, view) = renderer.aovs(camera).expect("the G-buffer");
         (film, aovs, view)
     }
+}
+
+/// The device of the tests.
+#[must_use]
+pub fn choice() -> DeviceChoice {
+    std::env::var("ETALON_TEST_DEVICE")
+        .map_or(DeviceChoice::Cpu, |text| text.parse().unwrap_or_else(|never| match never {}))
 }
 
 impl Drop for Gpu {

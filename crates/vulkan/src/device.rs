@@ -102,6 +102,19 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Keeps the drivers loaded from the second instance of the process on, by an instance that is never destroyed: the
+/// loader unloads them with the last one. NVIDIA's driver (580.159) can be loaded a few dozen times in a process; after
+/// that the loader finds no driver any more.
+fn keep_drivers_loaded(entry: &ash::Entry) {
+    static CREATED: AtomicU64 = AtomicU64::new(0);
+    if CREATED.fetch_add(1, Ordering::Relaxed) == 1 {
+        let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+        // SAFETY: the structures outlive the call. Without it there is only more to load.
+        let kept = unsafe { entry.create_instance(&vk::InstanceCreateInfo::default().application_info(&app), None) };
+        std::mem::forget((entry.clone(), kept));
+    }
+}
+
 /// The right of an instance to enable validation (`open.rs`).
 pub(super) type RightToValidate = Box<dyn Send + Sync>;
 
@@ -163,6 +176,7 @@ impl Instance {
         }
         // SAFETY: `info` points at data that outlives the call.
         let raw = unsafe { entry.create_instance(&info, None) }.context("creating a Vulkan 1.3 instance")?;
+        keep_drivers_loaded(&entry);
         let messages: Box<Messages> = Box::default();
         let debug = if validate {
             let utils = ext::debug_utils::Instance::new(&entry, &raw);

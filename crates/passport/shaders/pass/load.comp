@@ -17,7 +17,7 @@ void main() {
         uint at = load * stride + i;
         if (KIND == 0) sum += vectors[at];
         if (KIND == 1) sum += imageLoad(texels, int(at));
-        if (KIND == 2) sum += texelFetch(picture, ivec2(at & 1023u, at >> 10), 0);
+        if (KIND == 2) sum += texelFetch(picture, ivec2(at & 4095u, at >> 12), 0);
         if (KIND == 3) atomicAdd(counters[at & 255u], 1u);
     }
     sums[i] = sum.x + sum.y + sum.z + sum.w;
