@@ -222,7 +222,11 @@ fn main() -> Result<()> {
             "ours",
             "Embree",
             "ratio",
-            if device.is_software() { format!("CPU time / {threads}") } else { "GPU time".to_owned() }
+            if device.is_software() {
+                format!("CPU time / {threads}")
+            } else {
+                format!("GPU time; Embree CPU time / {threads}")
+            }
         );
         for way in [Traversal::Links16, Traversal::Links32, Traversal::Stack] {
             let mut tracer = Tracer::new(&device, scene, Some(way))?;

@@ -38,7 +38,8 @@ HitPoint on_triangle(uint leaf, vec3 p_bvh, vec3 direction) {
     return hit_point_of(Hit(0.0, leaf, t.weights.y / whole, t.weights.z / whole), p_bvh, vec3(0.0));
 }
 
-// Moves a surface to where its pixel's ray meets its triangle: rays leave from there.
+// Moves the origin of a surface's rays to where its pixel's ray meets the plane of its triangle. p_rel stays: lighting does
+// not depend on whether there are rays.
 HitPoint put_on_triangle(inout Surface s, uint leaf, vec3 direction) {
     HitPoint point = on_triangle(leaf, s.p_bvh, direction);
     s.p_bvh = point.p;

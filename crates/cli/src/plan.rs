@@ -42,7 +42,7 @@ pub struct PlanArgs {
     picture: PictureOptions,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Predict the time and the error of each rung at this size, from pictures with few pixels
+    /// Predict the time and the error of each rung at this size, from some of the picture's tiles
     #[arg(long, help_heading = heading::QUALITY)]
     forecast: bool,
     /// Print one JSON document

@@ -28,4 +28,5 @@ pub mod size;
 pub mod statistics;
 pub mod sweep;
 pub mod table;
+pub mod tiles;
 pub mod warm;

@@ -1,8 +1,6 @@
-//! Predicts the time and error of every rung at a size from renders with few pixels (`etalon plan --forecast`); nothing
-//! is drawn at that size.
+//! Predicts the time and error of every rung from a share of the picture's tiles (`etalon plan --forecast`).
 //!
-//! Errors are taken over from the small picture. Times are extrapolated by the growth between two small sizes. See
-//! docs/cost.md.
+//! Errors are those of the tiles. Times are extrapolated by the growth between two shares. See docs/cost.md.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,20 +9,21 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 
 use super::pace::Step;
-use super::size::{Growth, fewer, pixels, resized};
+use super::size::{Growth, pixels, scaled, shared};
 use super::statistics::Interval;
 use super::sweep::{Listener, Sweep, SweepExtent};
 use super::table::{Point, REFERENCE, Table};
+use super::tiles::spread;
 use super::warm::Bench;
 use etalon::plan::{Knobs, Model};
 
-/// Default limit for the number of pixels that are drawn.
+/// Default number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// Relative scatter of an error in addition to noise, because few pixels sample edges, glows and small objects
-/// otherwise than many: in a picture of 64x36 pixels, and the power of the number of pixels with which it falls,
-/// between the share of edges (0.5) and of single pixels (1). Fitted to 64x36 and to 160x90 pixels (docs/cost.md).
-const OTHER_PIXELS: f64 = 0.15;
-const FALLS: f64 = 0.8;
+/// Pixels of a tile.
+const TILE_PIXELS: f64 = 64.0;
+/// Relative scatter of an error in addition to noise, times the root of the number of tiles: the tiles that are drawn
+/// are not those that are left out. Fitted to five scenes whose pictures were known whole (docs/cost.md).
+const OTHER_TILES: f64 = 1.2;
 
 /// Predicted time and error of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,7 +44,7 @@ pub struct Trial<'a> {
     pub folder: &'a Path,
     /// Budget of the run.
     pub extent: SweepExtent,
-    /// Largest number of pixels.
+    /// About how many pixels are drawn.
     pub pixels: f64,
 }
 
@@ -55,21 +54,25 @@ pub struct Trial<'a> {
 /// When a picture cannot be drawn or written.
 pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(Step<'_>)) -> Result<Vec<Prediction>> {
     let size = bench.settings.size;
-    let few = resized(bench, fewer(size, (pixels(size) / trial.pixels).max(1.0)));
-    let scatter = OTHER_PIXELS * (pixels([64, 36]) / pixels(few.settings.size)).powf(FALLS);
+    let share = spread(size, pixels(size) / trial.pixels);
+    let few = shared(bench, share);
+    let left_out = 1.0 - 1.0 / f64::from(share.of);
+    let scatter = OTHER_TILES * (left_out * TILE_PIXELS / pixels(few.film_size())).sqrt();
     let growth = Growth::of(&few, size, &[Knobs::of(Model::Recursive), Knobs::of(Model::Local)])?;
     let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
+    let few = shared(bench, share);
     let of = |point: &Point| {
         let e = point.errors.error;
-        Prediction {
+        let whole = few.draws_all(&point.rungs()?)?;
+        Ok(Prediction {
             picture: point.name.clone(),
             knobs: point.knobs.clone(),
-            gpu_ms: growth.of_time(point),
+            gpu_ms: if whole { scaled(point, 1.0) } else { growth.of_time(point) },
             error: Interval { median: e.median, low: e.low * (1.0 - scatter), high: e.high * (1.0 + scatter) },
-        }
+        })
     };
-    Ok(table.points.iter().filter(|point| point.name != REFERENCE).map(of).collect())
+    table.points.iter().filter(|point| point.name != REFERENCE).map(of).collect()
 }
 
 /// Quality of predictions.

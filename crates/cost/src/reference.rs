@@ -17,7 +17,7 @@ use super::size::{fewer, pixels, resized};
 use super::statistics::{MANY, standard_errors};
 use super::table::{RESOLVED, Reference, Round};
 use super::warm::{Bench, total};
-use etalon::frame::{Progress, Settings};
+use etalon::frame::{Progress, Settings, TileShare};
 use etalon::image::halves::error_of_halves;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
@@ -161,7 +161,7 @@ fn draw(
             continue;
         }
         if done.is_multiple_of(each) {
-            let Some(now) = renderer.half_means_alone()? else {
+            let Some(now) = renderer.half_means_alone()?.map(|halves| halves.map(|half| bench.film(half))) else {
                 bail!("a path-traced reference has no half buffers: a bug of Etalon")
             };
             let count = (done / each) as f32;
@@ -177,7 +177,7 @@ fn draw(
         }
     }
     let rendered = renderer.picture(&drawing)?;
-    Ok((parts, renderer.png(&rendered)?, total(&rendered)))
+    Ok((parts, bench.display(&rendered)?.1, total(&rendered)))
 }
 
 /// Measurements of a pilot picture.
@@ -210,7 +210,9 @@ impl Pilot {
     pub fn draw(bench: &Bench<'_>, called_for: bool, [budget_ms, share]: [f64; 2], may_shrink: bool) -> Result<Self> {
         let begun = Instant::now();
         let asked = bench.settings.size;
-        let few = fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0));
+        // A share of the tiles has few pixels already.
+        let is_share = bench.settings.share != TileShare::ALL;
+        let few = if is_share { asked } else { fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0)) };
         let bench = &resized(bench, few);
         let plain = look(bench, "rgb")?;
         let by_wavelength = called_for && told_by_wavelength(bench);
@@ -255,7 +257,7 @@ impl Pilot {
 
 /// Whether the difference of two pictures is significant.
 fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
-    let (view, size) = (bench.settings.view_transform(), bench.settings.size);
+    let (view, size) = (bench.settings.view_transform(), bench.film_size());
     let halves = |parts: &Parts| -> [Shown; 2] { [0, 1].map(|odd| shown(&half(parts, odd), &view)) };
     let enough = standard_errors(3, MANY);
     significant(&in_blocks(&halves(a), &halves(b), size[0] as usize), enough)
@@ -351,7 +353,6 @@ impl Refined {
         priced: u32,
         bench: &Bench<'_>,
     ) -> Result<(Reference, Vec<u8>)> {
-        let Settings { size: [width, height], .. } = bench.settings;
         let halves = [0, 1].map(|odd| half(&self.parts, odd));
         let sum = |half: &Picture| -> Vec<[f32; 4]> { half.rgba.iter().map(|p| p.map(|v| 0.5 * v)).collect() };
         let own = error_of_halves([&sum(&halves[0]), &sum(&halves[1])], 1);
@@ -362,8 +363,8 @@ impl Refined {
         let png = match &self.png {
             Some(png) => png.clone(),
             None => {
-                let rgba: Vec<u8> = truth.display.rgba.concat();
-                png::encode_png(width, height, &rgba, false)?
+                let Display { width, height, rgba } = &truth.display;
+                png::encode_png(*width, *height, rgba.as_flattened(), false)?
             }
         };
         let samples = set(&self.knobs, "samples", &self.rounds[0].samples.to_string())?;

@@ -23,7 +23,7 @@ use super::table::{
     AtSize, Family, QuadratureOrder, REFERENCE, RESOLVED, Recommended, Reference, RequestedSize, Table, Tried,
 };
 use super::warm::{Bench, enough_ms};
-use etalon::frame::Progress;
+use etalon::frame::{Progress, TileShare};
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 use etalon::plan::{Knobs, Model};
@@ -77,7 +77,8 @@ impl Sweep<'_> {
         let states = States::of(&self.bench)?;
         let begun = Refined::read(self.folder)?.map(|(known, _)| known);
         let asked = self.bench.settings.size;
-        let bench = resized(&self.bench, begun.as_ref().map_or(asked, Refined::size));
+        let begun_size = begun.as_ref().map(Refined::size).filter(|_| self.bench.settings.share == TileShare::ALL);
+        let bench = resized(&self.bench, begun_size.unwrap_or(asked));
         let may_shrink = self.may_shrink && ends && self.others.is_empty() && begun.is_none();
         let share = [budget_s * 1e3, REFERENCE_SHARE];
         let pilot = Pilot::draw(&bench, states.calls_for("colour"), share, may_shrink)?;
@@ -396,7 +397,7 @@ impl Run<'_> {
             device: self.sweep.device(),
             scene: self.sweep.scene.to_owned(),
             command: self.command.to_owned(),
-            size: self.bench.settings.size,
+            size: self.bench.film_size(),
             asked: None,
             reference: reference.clone(),
             knobs: states.list(),

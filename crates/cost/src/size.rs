@@ -1,7 +1,7 @@
-//! Extrapolation of errors and times between sizes of the same picture.
+//! Extrapolation of times from few pixels to many: of a smaller picture, or of a share of a picture's tiles.
 //!
-//! The mean error of a picture depends little on the number of pixels. A time is the sum of a constant per picture and
-//! a constant per pixel; measurements at two sizes determine both.
+//! A time is the sum of a constant per picture and a constant per pixel; measurements with two numbers of pixels
+//! determine both.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use super::command::set;
 use super::statistics::Interval;
 use super::table::Point;
 use super::warm::{Bench, total};
-use etalon::frame::Settings;
+use etalon::frame::{Settings, TileShare};
 use etalon::plan::Knobs;
 
 /// Relative scatter of an extrapolated time in addition to noise, because caches behave differently (measured:
@@ -39,6 +39,12 @@ pub fn resized<'a>(bench: &Bench<'a>, size: [u32; 2]) -> Bench<'a> {
     Bench { settings: Settings { size, ..bench.settings.clone() }, ..*bench }
 }
 
+/// The bench with a share of the picture's tiles.
+#[must_use]
+pub fn shared<'a>(bench: &Bench<'a>, share: TileShare) -> Bench<'a> {
+    Bench { settings: Settings { share, ..bench.settings.clone() }, ..*bench }
+}
+
 /// Growth factors of times from one size to another, for path-traced pictures and for all others.
 #[derive(Debug, Clone)]
 pub struct Growth {
@@ -64,40 +70,53 @@ impl PassGrowth {
 }
 
 impl Growth {
-    /// Growth from the bench's size to `size`. Times are measured at the bench's size and at a quarter of its pixels,
-    /// with the exact rungs in RGB, which every run has compiled, and with `rasters`, rungs without path tracing.
+    /// Growth from the bench's pixels to those of `size`. Times are measured with the bench's pixels and with a quarter
+    /// of them, with the exact rungs in RGB, which every run has compiled, and with `rasters`, rungs without path
+    /// tracing.
     ///
     /// # Errors
     /// When a picture cannot be drawn.
     pub fn of(bench: &Bench<'_>, size: [u32; 2], rasters: &[Knobs]) -> Result<Self> {
         let exact = set(&set(&Knobs::exact(), "samples", "1")?, "colour", "rgb")?;
-        Ok(Self { paths: measured(bench, size, &[exact])?, others: measured(bench, size, rasters)? })
+        let TileShare { index, of } = bench.settings.share;
+        let few = match bench.settings.share {
+            TileShare::ALL => resized(bench, fewer(bench.settings.size, 4.0)),
+            _ => shared(bench, TileShare { index, of: 4 * of }),
+        };
+        let of = |all: &[Knobs]| measured([&few, bench], pixels(size), all);
+        Ok(Self { paths: of(&[exact])?, others: of(rasters)? })
     }
 
     /// Growth in proportion to pixels, without measuring.
     #[must_use]
     pub fn by_pixels(bench: &Bench<'_>, size: [u32; 2]) -> Self {
-        let all = PassGrowth { whole: pixels(size) / pixels(bench.settings.size), ..PassGrowth::default() };
+        let all = PassGrowth { whole: pixels(size) / bench.drawn_pixels(), ..PassGrowth::default() };
         Self { paths: all.clone(), others: all }
     }
 
     /// Extrapolated time of a point.
     #[must_use]
     pub fn of_time(&self, point: &Point) -> Interval {
-        let factor = if point.is_path_traced() { &self.paths } else { &self.others }.of(point);
-        let Interval { median, low, high } = point.gpu_ms;
-        Interval {
-            median: factor * median,
-            low: factor * low * (1.0 - OTHER_SIZE),
-            high: factor * high * (1.0 + OTHER_SIZE),
-        }
+        let growth = if point.is_path_traced() { &self.paths } else { &self.others };
+        scaled(point, growth.of(point))
     }
 }
 
-/// Growth factors measured with some rungs. A pass of several of them goes by the last.
-fn measured(bench: &Bench<'_>, size: [u32; 2], all: &[Knobs]) -> Result<PassGrowth> {
-    let small = resized(bench, fewer(bench.settings.size, 4.0));
-    let [few, here, asked] = [small.settings.size, bench.settings.size, size].map(pixels);
+/// A point's time, `factor` times as long.
+#[must_use]
+pub fn scaled(point: &Point, factor: f64) -> Interval {
+    let Interval { median, low, high } = point.gpu_ms;
+    Interval {
+        median: factor * median,
+        low: factor * low * (1.0 - OTHER_SIZE),
+        high: factor * high * (1.0 + OTHER_SIZE),
+    }
+}
+
+/// Growth factors to the number of pixels `asked`, measured with some rungs and two benches, the one with fewer pixels
+/// first. A pass of several of the rungs goes by the last.
+fn measured([small, bench]: [&Bench<'_>; 2], asked: f64, all: &[Knobs]) -> Result<PassGrowth> {
+    let [few, here] = [small, bench].map(Bench::drawn_pixels);
     // A time is a + b·pixels.
     let grown = |few_ms: f64, here_ms: f64| {
         let each = (here_ms - few_ms) / (here - few).max(1.0);
@@ -106,7 +125,7 @@ fn measured(bench: &Bench<'_>, size: [u32; 2], all: &[Knobs]) -> Result<PassGrow
     };
     let mut growth = PassGrowth::default();
     for knobs in all {
-        let [few, here] = [least(&small, knobs)?, least(bench, knobs)?];
+        let [few, here] = [least(small, knobs)?, least(bench, knobs)?];
         growth.whole = grown(few.values().sum(), here.values().sum());
         let known = here.iter().filter_map(|(name, ms)| Some((name.clone(), grown(*few.get(name)?, *ms))));
         growth.passes.extend(known);

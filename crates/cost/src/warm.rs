@@ -7,12 +7,14 @@ use std::time::Instant;
 use anyhow::Result;
 
 use super::difference::{Shown, shown};
+use super::size::pixels;
 use super::statistics::Interval;
-use etalon::frame::{Rendered, Renderer, Settings, Work};
+use super::tiles;
+use etalon::frame::{Rendered, Renderer, Settings, TileShare, Work};
 use etalon::gpu::{Compiled, Device, Program};
 use etalon::image::Picture;
-use etalon::image::png::Display;
-use etalon::plan::{Knobs, Plan};
+use etalon::image::png::{self, Display};
+use etalon::plan::{Knobs, Plan, Screen};
 use etalon::prepare::Original;
 use etalon::scene::Camera;
 use etalon::scene::environment::Environment;
@@ -46,7 +48,8 @@ pub struct Bench<'a> {
     pub original: &'a Original,
     /// Environment map.
     pub environment: Option<&'a Environment>,
-    /// Settings of the renderer; the knobs are replaced for each picture.
+    /// Settings of the renderer; the knobs are replaced for each picture. Of a share of the tiles, pictures are these
+    /// tiles side by side (`tiles.rs`).
     pub settings: Settings,
     /// The camera.
     pub camera: &'a Camera,
@@ -120,6 +123,44 @@ impl Bench<'_> {
         self.original.plan(&settings.conditions(self.environment)?)
     }
 
+    /// Size in pixels of the pictures that are measured.
+    #[must_use]
+    pub fn film_size(&self) -> [u32; 2] {
+        tiles::packed_size(self.settings.size, self.settings.share)
+    }
+
+    /// Number of pixels that are drawn: all tiles of the share, also those that `tiles.rs` leaves out.
+    #[must_use]
+    pub fn drawn_pixels(&self) -> f64 {
+        pixels(self.settings.size) / f64::from(self.settings.share.of)
+    }
+
+    /// The tiles of the share that `settings` names, out of a picture.
+    #[must_use]
+    pub fn film(&self, picture: Picture) -> Picture {
+        tiles::packed_picture(picture, self.settings.share)
+    }
+
+    /// Display values of a picture, and its PNG file.
+    ///
+    /// # Errors
+    /// When the file cannot be encoded.
+    pub fn display(&self, rendered: &Rendered) -> Result<(Display, Vec<u8>)> {
+        let [width, height] = self.film_size();
+        let all = rendered.display.as_chunks::<4>().0.to_vec();
+        let rgba = tiles::packed(all, self.settings.size, self.settings.share);
+        let png = png::encode_png(width, height, rgba.as_flattened(), rendered.has_alpha)?;
+        Ok((Display { width, height, rgba }, png))
+    }
+
+    /// Whether rungs draw the whole picture, whatever the share: they look up pixels of other tiles.
+    ///
+    /// # Errors
+    /// When the scene has nothing to draw.
+    pub fn draws_all(&self, knobs: &Knobs) -> Result<bool> {
+        Ok(self.settings.share == TileShare::ALL || self.plan(knobs)?.screen != Screen::default())
+    }
+
     /// Warms up a renderer: uploads the scene and draws two samples, which compiles everything.
     ///
     /// # Errors
@@ -136,7 +177,8 @@ impl Bench<'_> {
     /// # Errors
     /// When these knobs cannot be drawn.
     pub fn renderer(&self, knobs: &Knobs, seed: u32) -> Result<Renderer> {
-        let settings = Settings { knobs: knobs.clone(), seed, max_error: None, ..self.settings.clone() };
+        let share = if self.draws_all(knobs)? { TileShare::ALL } else { self.settings.share };
+        let settings = Settings { knobs: knobs.clone(), seed, max_error: None, share, ..self.settings.clone() };
         Renderer::new(self.device, self.original, self.environment, settings)
     }
 
@@ -171,9 +213,9 @@ impl Bench<'_> {
         enough_ms: f64,
     ) -> Result<Measurement> {
         let rendered = warm.renderer.render(self.camera, &mut |_| ())?;
-        let film = warm.renderer.film_alone()?;
-        let halves = warm.renderer.half_means_alone()?;
-        let [width, height] = self.settings.size;
+        let film = self.film(warm.renderer.film_alone()?);
+        let halves = warm.renderer.half_means_alone()?.map(|halves| halves.map(|half| self.film(half)));
+        let (display, png) = self.display(&rendered)?;
         let view = self.settings.view_transform();
         let same = other.as_ref().is_some_and(|(_, known)| known.is(&film));
         let mut ms = vec![total(&rendered)];
@@ -198,13 +240,10 @@ impl Bench<'_> {
         Ok(Measurement {
             film,
             halves: halves.map(|halves| halves.map(|half| shown(&half, &view))),
-            noise: rendered.errors.last().map(|error| error.relmse),
-            png: warm.renderer.png(&rendered)?,
-            display: Display {
-                width,
-                height,
-                rgba: rendered.display.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect(),
-            },
+            // A mean over the whole picture, which is black beside the share.
+            noise: rendered.errors.last().map(|error| error.relmse * f64::from(self.settings.share.of)),
+            png,
+            display,
             ms,
             baseline_ms,
             passes: passes.into_iter().map(|(name, ms)| (name, Interval::of(&ms).median)).collect(),

@@ -64,7 +64,7 @@ pub struct Scope {
     pub scenes: Vec<String>,
     /// Size of pictures in pixels.
     pub size: [u32; 2],
-    /// Bytes that are copied and loaded: a multiple of 2^18.
+    /// Bytes that are copied and loaded: a multiple of 2^16.
     pub bytes: u64,
     /// Size of the pictures whose rays are timed.
     pub rays_at: [u32; 2],
@@ -88,16 +88,19 @@ impl Default for Scope {
 }
 
 impl Scope {
-    /// The default scope, with speeds by what fills a GPU where the device is one: ten times the 50 MB of the largest
-    /// cache known (NVIDIA H100), within a sixteenth of the largest heap, and more pixels than it has threads
+    /// The default scope, with speeds by what fills a GPU where the device is one: up to ten times the 50 MB of the
+    /// largest cache known (NVIDIA H100), as its memory, buffers and images allow, and more pixels than it has threads
     /// (270,336).
     #[must_use]
     pub fn of(device: &Arc<Device>) -> Self {
         let mut scope = Self::default();
         if !device.is_software() {
-            let heap = Capabilities::of(device).heaps.into_iter().max().unwrap_or(0);
-            let most = (512 << 20).min(heap / 16).min(device.max_storage_bytes());
-            scope.bytes = most.max(scope.bytes) & !((1 << 18) - 1);
+            // The smallest heap of a gigabyte or more: a smaller one is a window onto another.
+            let heaps = Capabilities::of(device).heaps.into_iter();
+            let memory = heaps.filter(|&bytes| bytes >= 1 << 30).min().unwrap_or(0);
+            let rows = u64::from(device.max_image_size()) * speed::BYTES_OF_A_ROW;
+            let most = (512 << 20).min(memory / 16).min(device.max_storage_bytes()).min(rows);
+            scope.bytes = most.max(scope.bytes) & !(speed::BYTES_OF_A_ROW - 1);
             scope.rays_at = [1280, 720];
         }
         scope

@@ -19,6 +19,8 @@ use crate::shader::{load, spin};
 const LOADS: u32 = 16;
 /// Columns of the image that is loaded from.
 const COLUMNS: u32 = 4096;
+/// Bytes of a row of it, four floats a pixel.
+pub(crate) const BYTES_OF_A_ROW: u64 = 16 * COLUMNS as u64;
 /// Submissions that are timed.
 const SUBMISSIONS: usize = 100;
 

@@ -32,7 +32,7 @@ enum Place {
 static PLACES: RwLock<()> = RwLock::new(());
 
 impl Gpu {
-    /// Opens the software device for shared use; a machine without it fails the test.
+    /// Opens the device of the tests ([`choice`]) for shared use; a machine without it fails the test.
     pub fn open() -> Self {
         let place = Place::Shared { _guard: PLACES.read().unwrap_or_else(PoisonError::into_inner) };
         Self::opened(place, Device::open)
@@ -72,7 +72,7 @@ impl Gpu {
     fn opened(place: Place, open: impl FnOnce(&DeviceChoice, bool) -> anyhow::Result<Arc<Device>>) -> Self {
         match open(&choice(), true) {
             Ok(device) => Self { device, expects_errors: false, _place: place },
-            Err(error) => panic!("these tests need lavapipe and the Khronos validation layer: {error:#}"),
+            Err(error) => panic!("these tests need {} and the Khronos validation layer: {error:#}", choice()),
         }
     }
 

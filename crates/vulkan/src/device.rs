@@ -105,13 +105,18 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Keeps the drivers loaded from the second instance of the process on, by an instance that is never destroyed: the
 /// loader unloads them with the last one. NVIDIA's driver (580.159) can be loaded a few dozen times in a process; after
 /// that the loader finds no driver any more.
-fn keep_drivers_loaded(entry: &ash::Entry) {
+fn keep_drivers_loaded(entry: &ash::Entry, extensions: &[*const c_char], flags: vk::InstanceCreateFlags) {
     static CREATED: AtomicU64 = AtomicU64::new(0);
     if CREATED.fetch_add(1, Ordering::Relaxed) == 1 {
         let app = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
-        // SAFETY: the structures outlive the call. Without it there is only more to load.
-        let kept = unsafe { entry.create_instance(&vk::InstanceCreateInfo::default().application_info(&app), None) };
-        std::mem::forget((entry.clone(), kept));
+        let info =
+            vk::InstanceCreateInfo::default().application_info(&app).enabled_extension_names(extensions).flags(flags);
+        // SAFETY: the structures outlive the call.
+        match unsafe { entry.create_instance(&info, None) } {
+            Ok(kept) => std::mem::forget((entry.clone(), kept)),
+            // The instance that was asked for is there: only a later one may be missing.
+            Err(error) => tracing::debug!("no instance keeps the drivers loaded: {error}"),
+        }
     }
 }
 
@@ -151,8 +156,10 @@ impl Instance {
         if has_debug_utils {
             enabled.push(ext::debug_utils::NAME.as_ptr());
         }
-        if has(khr::portability_enumeration::NAME) {
-            enabled.push(khr::portability_enumeration::NAME.as_ptr());
+        let portability = [khr::portability_enumeration::NAME.as_ptr()];
+        let portability = if has(khr::portability_enumeration::NAME) { &portability[..] } else { &[] };
+        if !portability.is_empty() {
+            enabled.extend(portability);
             flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
         }
         let mut layer_names = Vec::new();
@@ -176,7 +183,7 @@ impl Instance {
         }
         // SAFETY: `info` points at data that outlives the call.
         let raw = unsafe { entry.create_instance(&info, None) }.context("creating a Vulkan 1.3 instance")?;
-        keep_drivers_loaded(&entry);
+        keep_drivers_loaded(&entry, portability, flags);
         let messages: Box<Messages> = Box::default();
         let debug = if validate {
             let utils = ext::debug_utils::Instance::new(&entry, &raw);

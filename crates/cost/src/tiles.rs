@@ -1,0 +1,128 @@
+//! A picture of some tiles of a larger one: what a forecast measures in place of a smaller picture.
+//!
+//! A smaller picture has other edges and larger glows than the picture that is asked for. Tiles of 8x8 pixels of that
+//! picture itself have neither. They are put side by side, so that everything that judges pictures judges these. What
+//! looks at neighbouring pixels, such as FLIP, sees the seams; the mean error of pixels does not.
+
+use etalon::frame::TileShare;
+use etalon::image::Picture;
+
+/// Side of a tile in pixels (shaders/lib/own_tiles.glsl).
+const TILE: u32 = 8;
+
+/// The part of a row of tiles by which the pattern of a share moves from row to row, so that few tiles lie in columns:
+/// the golden section.
+const STEP: f64 = 0.381_966;
+
+/// The share of one in `times` tiles of a picture of `size` pixels, give or take a quarter, whose tiles are spread most
+/// evenly.
+#[must_use]
+pub fn spread(size: [u32; 2], times: f64) -> TileShare {
+    let across = size[0].div_ceil(TILE);
+    let about = times.round().max(1.0) as u32;
+    if about == 1 {
+        return TileShare::ALL;
+    }
+    let uneven = |of: u32| {
+        let moves = f64::from(across % of) / f64::from(of);
+        (moves - STEP).abs().min((moves - 1.0 + STEP).abs())
+    };
+    // With a common divisor, the pattern returns to its first columns sooner.
+    let divisor = |of: u32| (1..=of).rev().find(|d| of % d == 0 && across % d == 0);
+    let near = (about - about / 4).max(2)..=about + about / 4;
+    let of = near.min_by(|a, b| divisor(*a).cmp(&divisor(*b)).then(uneven(*a).total_cmp(&uneven(*b))));
+    let of = of.unwrap_or(about);
+    TileShare { index: 0, of }
+}
+
+/// The whole tiles of a share, and how they lie side by side.
+struct Packing {
+    tiles: Vec<[u32; 2]>,
+    across: u32,
+    down: u32,
+}
+
+impl Packing {
+    /// A rectangle of tiles, about as wide as high. Tiles beyond its last row are left out: fewer than a row.
+    fn of(size: [u32; 2], share: TileShare) -> Self {
+        let [across, down] = size.map(|side| side / TILE);
+        let at = |row: u32| (0..across).map(move |column| [column * TILE, row * TILE]);
+        let tiles: Vec<_> = (0..down).flat_map(at).filter(|&corner| share.has(corner, size[0])).collect();
+        let down = (tiles.len() as f64).sqrt().floor().max(1.0) as u32;
+        let across = tiles.len() as u32 / down;
+        Self { tiles, across, down }
+    }
+}
+
+/// Size in pixels of what [`packed`] gives: `size` itself for the whole picture.
+#[must_use]
+pub fn packed_size(size: [u32; 2], share: TileShare) -> [u32; 2] {
+    if share == TileShare::ALL {
+        return size;
+    }
+    let Packing { across, down, .. } = Packing::of(size, share);
+    [across * TILE, down * TILE]
+}
+
+/// The pixels of a share's tiles side by side, row by row; all pixels for the whole picture.
+#[must_use]
+pub fn packed<T: Copy>(pixels: Vec<T>, size: [u32; 2], share: TileShare) -> Vec<T> {
+    if share == TileShare::ALL {
+        return pixels;
+    }
+    let Packing { tiles, across, down } = Packing::of(size, share);
+    let row = |y: u32| {
+        let tiles = &tiles[(y / TILE * across) as usize..((y / TILE + 1) * across) as usize];
+        tiles.iter().flat_map(move |[x, top]| {
+            let first = ((top + y % TILE) * size[0] + x) as usize;
+            first..first + TILE as usize
+        })
+    };
+    (0..down * TILE).flat_map(row).map(|at| pixels[at]).collect()
+}
+
+/// [`packed`] for a picture.
+#[must_use]
+pub fn packed_picture(picture: Picture, share: TileShare) -> Picture {
+    let size = [picture.width, picture.height];
+    let [width, height] = packed_size(size, share);
+    Picture { width, height, rgba: packed(picture.rgba, size, share) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_is_spread_over_rows_and_columns() {
+        let cases = [
+            ([320, 180], 4.0),
+            ([1280, 720], 64.0),
+            ([128, 72], 4.0),
+            ([1920, 1080], 144.0),
+            ([320, 240], 5.3),
+            ([240, 135], 2.25),
+        ];
+        for (size, times) in cases {
+            let share = spread(size, times);
+            assert!((0.75..=1.25).contains(&(f64::from(share.of) / times)), "{size:?}: {share:?}");
+            let across = size[0] / TILE;
+            let columns: std::collections::BTreeSet<u32> =
+                Packing::of(size, share).tiles.iter().map(|[x, _]| x / TILE).collect();
+            assert!(columns.len() as f64 > 0.4 * f64::from(across), "{size:?}: {} columns of {across}", columns.len());
+        }
+        assert_eq!(spread([64, 36], 0.7), TileShare::ALL);
+    }
+
+    #[test]
+    fn tiles_lie_side_by_side() {
+        let (size, share) = ([40, 20], TileShare { index: 1, of: 3 });
+        // Whole tiles 1, 4, 7 of ten; the rows from 16 on are no whole tiles. One row of three.
+        assert_eq!(packed_size(size, share), [24, 8]);
+        let pixels: Vec<[u32; 2]> = (0..20).flat_map(|y| (0..40).map(move |x| [x, y])).collect();
+        let packed_pixels = packed(pixels.clone(), size, share);
+        assert_eq!(packed_pixels.len(), 24 * 8);
+        assert_eq!([packed_pixels[0], packed_pixels[8], packed_pixels[16 + 24]], [[8, 0], [32, 0], [16, 9]]);
+        assert_eq!(packed(pixels.clone(), size, TileShare::ALL), pixels);
+    }
+}
