@@ -13,17 +13,15 @@ use super::size::{Growth, pixels, scaled, shared};
 use super::statistics::Interval;
 use super::sweep::{Listener, Sweep, SweepExtent};
 use super::table::{Point, REFERENCE, Table};
-use super::tiles::spread;
+use super::tiles::{spread, standard_error};
 use super::warm::Bench;
+use etalon::image::png::read_display;
 use etalon::plan::{Knobs, Model};
 
 /// Default number of pixels that are drawn.
 pub const PIXELS: f64 = 160.0 * 90.0;
-/// Pixels of a tile.
-const TILE_PIXELS: f64 = 64.0;
-/// Relative scatter of an error in addition to noise, times the root of the number of tiles: the tiles that are drawn
-/// are not those that are left out. Fitted to five scenes whose pictures were known whole (docs/cost.md).
-const OTHER_TILES: f64 = 1.2;
+/// Standard errors of an interval that holds 90 % of normally distributed values.
+const IN_90: f64 = 1.645;
 
 /// Predicted time and error of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,19 +55,23 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
     let share = spread(size, pixels(size) / trial.pixels);
     let few = shared(bench, share);
     let left_out = 1.0 - 1.0 / f64::from(share.of);
-    let scatter = OTHER_TILES * (left_out * TILE_PIXELS / pixels(few.film_size())).sqrt();
     let growth = Growth::of(&few, size, &[Knobs::of(Model::Recursive), Knobs::of(Model::Local)])?;
     let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
     let few = shared(bench, share);
+    let display = |name: &str| read_display(&trial.folder.join(name));
+    let reference = display("reference.png")?;
     let of = |point: &Point| {
         let e = point.errors.error;
+        // Beside noise: the tiles that are drawn are not those that are left out.
+        let picture = display(&format!("pictures/{}.png", point.picture))?;
+        let scatter = IN_90 * standard_error(&picture, &reference, left_out);
         let whole = few.draws_all(&point.rungs()?)?;
         Ok(Prediction {
             picture: point.name.clone(),
             knobs: point.knobs.clone(),
             gpu_ms: if whole { scaled(point, 1.0) } else { growth.of_time(point) },
-            error: Interval { median: e.median, low: e.low * (1.0 - scatter), high: e.high * (1.0 + scatter) },
+            error: Interval { median: e.median, low: e.low * (1.0 - scatter).max(0.0), high: e.high * (1.0 + scatter) },
         })
     };
     table.points.iter().filter(|point| point.name != REFERENCE).map(of).collect()

@@ -6,6 +6,7 @@
 
 use etalon::frame::TileShare;
 use etalon::image::Picture;
+use etalon::image::png::Display;
 
 /// Side of a tile in pixels (shaders/lib/own_tiles.glsl).
 const TILE: u32 = 8;
@@ -28,7 +29,7 @@ pub fn spread(size: [u32; 2], times: f64) -> TileShare {
         (moves - STEP).abs().min((moves - 1.0 + STEP).abs())
     };
     // With a common divisor, the pattern returns to its first columns sooner.
-    let divisor = |of: u32| (1..=of).rev().find(|d| of % d == 0 && across % d == 0);
+    let divisor = |of: u32| (1..=of).rev().find(|d| of.is_multiple_of(*d) && across.is_multiple_of(*d));
     let near = (about - about / 4).max(2)..=about + about / 4;
     let of = near.min_by(|a, b| divisor(*a).cmp(&divisor(*b)).then(uneven(*a).total_cmp(&uneven(*b))));
     let of = of.unwrap_or(about);
@@ -89,9 +90,48 @@ pub fn packed_picture(picture: Picture, share: TileShare) -> Picture {
     Picture { width, height, rgba: packed(picture.rgba, size, share) }
 }
 
+/// Relative standard error of a picture's error (root mean square of display values) as an estimate from tiles: by the
+/// variance of the mean square between the tiles of a picture that is made of them (Cochran, Sampling Techniques, 1977,
+/// chapter 2). 0 where nothing differs. `left_out`: the part of all tiles that are not there.
+#[must_use]
+pub fn standard_error(picture: &Display, reference: &Display, left_out: f64) -> f64 {
+    let tiles_across = (picture.width / TILE).max(1) as usize;
+    let tiles = tiles_across * (picture.height / TILE).max(1) as usize;
+    let mut squares = vec![0.0; tiles];
+    for (at, (a, b)) in picture.rgba.iter().zip(&reference.rgba).enumerate() {
+        let (x, y) = (at % picture.width as usize, at / picture.width as usize);
+        let tile = y / TILE as usize * tiles_across + x / TILE as usize;
+        let squared = |c: usize| (f64::from(a[c]) - f64::from(b[c])).powi(2);
+        squares[tile.min(tiles - 1)] += squared(0) + squared(1) + squared(2);
+    }
+    let n = tiles as f64;
+    let mean = squares.iter().sum::<f64>() / n;
+    let variance = squares.iter().map(|square| (square - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
+    // A root has half the relative error.
+    if mean > 0.0 { 0.5 * (variance * left_out / n).sqrt() / mean } else { 0.0 }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The mean square is 0 in one half of 64 tiles and the same in the other half: its mean has a relative standard
+    /// error of 1/8, and the root of it half of that.
+    #[test]
+    fn tiles_that_differ_more_are_known_less() {
+        let display = |value: &dyn Fn(u32) -> u8| Display {
+            width: 64,
+            height: 64,
+            rgba: (0..64 * 64).map(|at| [value(at / 64 / 8 * 8 + at % 64 / 8), 0, 0, 255]).collect(),
+        };
+        let black = display(&|_| 0);
+        let half = display(&|tile| 200 * u8::from(tile * 7 % 64 < 32));
+        let found = standard_error(&half, &black, 1.0);
+        assert!((found - 0.5 / 8.0).abs() < 1e-3, "{found}");
+        assert!((standard_error(&half, &black, 0.25) - 0.5 * found).abs() < 1e-9);
+        assert_eq!(standard_error(&display(&|_| 9), &black, 1.0), 0.0);
+        assert_eq!(standard_error(&black, &black, 1.0), 0.0);
+    }
 
     #[test]
     fn a_share_is_spread_over_rows_and_columns() {
