@@ -15,8 +15,11 @@ const TILE: u32 = 8;
 /// the golden section.
 const STEP: f64 = 0.381_966;
 
+/// Fewest whole tiles that stand for a picture.
+const FEWEST: usize = 16;
+
 /// The share of one in `times` tiles of a picture of `size` pixels, give or take a quarter, whose tiles are spread most
-/// evenly.
+/// evenly. The whole picture where the share has too few whole tiles: a picture may be lower than a tile.
 #[must_use]
 pub fn spread(size: [u32; 2], times: f64) -> TileShare {
     let across = size[0].div_ceil(TILE);
@@ -32,8 +35,8 @@ pub fn spread(size: [u32; 2], times: f64) -> TileShare {
     let divisor = |of: u32| (1..=of).rev().find(|d| of.is_multiple_of(*d) && across.is_multiple_of(*d));
     let near = (about - about / 4).max(2)..=about + about / 4;
     let of = near.min_by(|a, b| divisor(*a).cmp(&divisor(*b)).then(uneven(*a).total_cmp(&uneven(*b))));
-    let of = of.unwrap_or(about);
-    TileShare { index: 0, of }
+    let share = TileShare { index: 0, of: of.unwrap_or(about) };
+    if Packing::of(size, share).tiles.len() < FEWEST { TileShare::ALL } else { share }
 }
 
 /// The whole tiles of a share, and how they lie side by side.
@@ -152,6 +155,7 @@ mod tests {
             assert!(columns.len() as f64 > 0.4 * f64::from(across), "{size:?}: {} columns of {across}", columns.len());
         }
         assert_eq!(spread([64, 36], 0.7), TileShare::ALL);
+        assert_eq!([spread([20_000, 7], 9.7), spread([64, 48], 4.0)], [TileShare::ALL; 2]);
     }
 
     #[test]
