@@ -27,6 +27,12 @@ pub fn pixels(size: [u32; 2]) -> f64 {
     size.map(f64::from).iter().product()
 }
 
+/// Number of pixels that a bench draws: all tiles of its share, also those that `tiles.rs` leaves out.
+#[must_use]
+pub fn drawn_pixels(bench: &Bench<'_>) -> f64 {
+    pixels(bench.settings.size) / f64::from(bench.settings.share.of)
+}
+
 /// A size with about `times` times fewer pixels.
 #[must_use]
 pub fn fewer(size: [u32; 2], times: f64) -> [u32; 2] {
@@ -90,7 +96,7 @@ impl Growth {
     /// Growth in proportion to pixels, without measuring.
     #[must_use]
     pub fn by_pixels(bench: &Bench<'_>, size: [u32; 2]) -> Self {
-        let all = PassGrowth { whole: pixels(size) / bench.drawn_pixels(), ..PassGrowth::default() };
+        let all = PassGrowth { whole: pixels(size) / drawn_pixels(bench), ..PassGrowth::default() };
         Self { paths: all.clone(), others: all }
     }
 
@@ -116,7 +122,7 @@ pub fn scaled(point: &Point, factor: f64) -> Interval {
 /// Growth factors to the number of pixels `asked`, measured with some rungs and two benches, the one with fewer pixels
 /// first. A pass of several of the rungs goes by the last.
 fn measured([small, bench]: [&Bench<'_>; 2], asked: f64, all: &[Knobs]) -> Result<PassGrowth> {
-    let [few, here] = [small, bench].map(Bench::drawn_pixels);
+    let [few, here] = [small, bench].map(drawn_pixels);
     // A time is a + b·pixels.
     let grown = |few_ms: f64, here_ms: f64| {
         let each = (here_ms - few_ms) / (here - few).max(1.0);

@@ -7,7 +7,6 @@ use std::time::Instant;
 use anyhow::Result;
 
 use super::difference::{Shown, shown};
-use super::size::pixels;
 use super::statistics::Interval;
 use super::tiles;
 use etalon::frame::{Rendered, Renderer, Settings, TileShare, Work};
@@ -127,12 +126,6 @@ impl Bench<'_> {
     #[must_use]
     pub fn film_size(&self) -> [u32; 2] {
         tiles::packed_size(self.settings.size, self.settings.share)
-    }
-
-    /// Number of pixels that are drawn: all tiles of the share, also those that `tiles.rs` leaves out.
-    #[must_use]
-    pub fn drawn_pixels(&self) -> f64 {
-        pixels(self.settings.size) / f64::from(self.settings.share.of)
     }
 
     /// The tiles of the share that `settings` names, out of a picture.
