@@ -61,7 +61,6 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
     let growth = Growth::of(&few, size, &[Knobs::of(Model::Recursive), Knobs::of(Model::Local)])?;
     let sweep = Sweep::alone(few, trial.folder, trial.extent.clone());
     let table = sweep.run(&mut Listener { step: progress, early: &mut |_| Ok(()) })?;
-    let few = shared(bench, share);
     let display = |name: &str| read_display(&trial.folder.join(name));
     let reference = display("reference.png")?;
     let of = |point: &Point| {
@@ -72,7 +71,7 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
         // The table's intervals hold all together; those of a forecast hold each by itself.
         let alone = IN_90 / table.standard_errors.max(IN_90);
         let [below, above] = [e.median - e.low, e.high - e.median].map(|noise| (noise * alone).hypot(scatter));
-        let whole = few.draws_all(&point.rungs()?)?;
+        let whole = sweep.bench.draws_all(&point.rungs()?)?;
         Ok(Prediction {
             picture: point.name.clone(),
             knobs: point.knobs.clone(),

@@ -108,7 +108,7 @@ impl Growth {
     }
 }
 
-/// A point's time, `factor` times as long.
+/// A point's time, `factor` times as long, with the scatter of another number of pixels.
 #[must_use]
 pub fn scaled(point: &Point, factor: f64) -> Interval {
     let Interval { median, low, high } = point.gpu_ms;

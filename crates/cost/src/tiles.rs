@@ -7,9 +7,7 @@
 use etalon::frame::TileShare;
 use etalon::image::Picture;
 use etalon::image::png::Display;
-
-/// Side of a tile in pixels (shaders/lib/own_tiles.glsl).
-const TILE: u32 = 8;
+use etalon::shader::lib::work_tile::WORK_TILE as TILE;
 
 /// The part of a row of tiles by which the pattern of a share moves from row to row, so that few tiles lie in columns:
 /// the golden section.

@@ -1,4 +1,4 @@
-//! `etalon plan --forecast`: what it says of a size at which it draws nothing, against what is then measured there.
+//! `etalon plan --forecast`: what it says of a picture by some of its tiles, against what is then measured of all.
 
 use etalon::frame::{Settings, TileShare};
 use etalon::image::png::decode_display;
@@ -7,6 +7,7 @@ use etalon::plan::{Knobs, Model};
 use etalon_cost::pace::Step;
 use etalon_cost::predict::{Trial, predict, score};
 use etalon_cost::reference::Refined;
+use etalon_cost::size::shared;
 use etalon_cost::sweep::{Listener, Sweep, SweepExtent};
 use etalon_cost::tiles::{packed_picture, spread};
 use etalon_cost::warm::Bench;
@@ -52,13 +53,8 @@ fn tiles_of_a_share_are_those_of_the_picture() {
     let opened = Opened::load("study:lamps").expect("a study scene");
     let (environment, settings) = opened.lit(Settings { size: SIZE, ..Settings::default() });
     let camera = opened.camera(SIZE).expect("a camera");
-    let bench = |share: TileShare| Bench {
-        device: &gpu.device,
-        original: &opened.original,
-        environment,
-        settings: Settings { share, ..settings.clone() },
-        camera: &camera,
-    };
+    let whole = Bench { device: &gpu.device, original: &opened.original, environment, settings, camera: &camera };
+    let bench = |share: TileShare| shared(&whole, share);
     let share = spread(SIZE, 4.0);
     for choice in ["reflection=ray", "reflection=screen"] {
         let mut knobs = Knobs::of(Model::Local);
