@@ -71,8 +71,8 @@ impl FragmentLists {
                 ),
             )?,
             nodes: Buffer::new(device, "fragment list nodes", pixels.min(limit) * node_bytes, Place::Device)?,
-            counters: Buffer::new(device, "fragment counters", 4, Place::Readback)?,
-            dropped: Buffer::new(device, "dropped fragments", 4, Place::Readback)?,
+            counters: Buffer::new(device, "fragment counters", 4, Place::Counters)?,
+            dropped: Buffer::new(device, "dropped fragments", 4, Place::Counters)?,
             work: FragmentTiles::new(device, size)?,
             strips: 1,
             size,
@@ -116,7 +116,7 @@ impl FragmentLists {
             }
             self.strips = (self.strips * 2).min(self.size[1]);
             self.counters =
-                Buffer::new(&self.device, "fragment counters", 4 * u64::from(self.strips), Place::Readback)?;
+                Buffer::new(&self.device, "fragment counters", 4 * u64::from(self.strips), Place::Counters)?;
         }
         if self.nodes.bytes() < wanted.min(limit) * self.node_bytes {
             let bytes = wanted.min(limit) * self.node_bytes;

@@ -40,7 +40,7 @@ impl Display {
     pub fn new(device: &Arc<Device>, size: [u32; 2]) -> Result<Self> {
         Ok(Self {
             pixels: Buffer::new(device, "display", 4 * u64::from(size[0]) * u64::from(size[1]), Place::Readback)?,
-            counts: Buffer::new(device, "counts of non-radiances", 16, Place::Readback)?,
+            counts: Buffer::new(device, "counts of non-radiances", 16, Place::Counters)?,
             device: device.clone(),
         })
     }

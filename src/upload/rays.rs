@@ -239,7 +239,7 @@ impl RaysOnDevice {
         Ok(Self {
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             snap_pixels: device.snap_pixels(),
-            counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Readback)?,
+            counts: Buffer::new(device, "work counts", size_of::<WorkCounts>() as u64, Place::Counters)?,
             constants: TraceConstants { traversal: traversal as u32, octants, hit: corners.contents, touching },
             facts: Some(BvhFacts {
                 build_ms,
@@ -294,7 +294,7 @@ impl RaysOnDevice {
             photons: PhotonsOnDevice::none(device)?,
             terms: Buffer::new(device, "trace terms", size_of::<TraceTerms>() as u64, Place::Upload)?,
             snap_pixels: device.snap_pixels(),
-            counts: Buffer::new(device, NOTHING, 0, Place::Readback)?,
+            counts: Buffer::new(device, NOTHING, 0, Place::Counters)?,
             constants: TraceConstants::default(),
             facts: None,
             fixed: TraceTerms { offset: ray_offset(half) as f32, ..bytemuck::Zeroable::zeroed() },

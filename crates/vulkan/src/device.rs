@@ -614,6 +614,16 @@ impl Device {
         u64::from(self.limits.max_storage_buffer_range)
     }
 
+    /// Size of the largest memory heap that is local to the device, in bytes.
+    #[must_use]
+    pub fn local_bytes(&self) -> u64 {
+        // SAFETY: the physical device belongs to the instance, which is alive.
+        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical) };
+        let local =
+            memory.memory_heaps_as_slice().iter().filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+        local.map(|heap| heap.size).max().unwrap_or_default()
+    }
+
     /// Optional features of the device.
     #[must_use]
     pub fn offers(&self) -> &Offers {

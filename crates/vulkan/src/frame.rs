@@ -19,7 +19,8 @@ use super::device::{Device, lock};
 use super::memory::{Buffer, Image};
 use super::pace::Interrupted;
 use super::recording::{
-    Dispatch, Groups, IndirectGroups, Own, Pass, RecordedWork, Recording, Target, bind_own, bind_sets, push_constants,
+    Dispatch, Groups, IndirectGroups, Own, Pass, RecordedWork, Recording, Repeat, Target, bind_own, bind_sets,
+    push_constants,
 };
 use super::set::{BoundSet, Pooled};
 use super::shader::{Program, SharedSet, Specialization as _};
@@ -287,6 +288,46 @@ impl<'a> Frame<'a> {
         Ok(())
     }
 
+    /// Dispatches that are repeated, in the order in which `record` adds them, until neither of `left` has a workgroup
+    /// after the last of them. Between any two of them all writes are visible. A frame with such a pass is several
+    /// submissions.
+    ///
+    /// # Errors
+    /// What `record` returns.
+    ///
+    /// # Panics
+    /// When `record` adds anything but dispatches, a bug of the caller.
+    pub fn repeat(
+        &mut self,
+        name: &str,
+        left: [IndirectGroups<'a>; 2],
+        record: impl FnOnce(&mut Self) -> Result<()>,
+    ) -> Result<()> {
+        let before = self.passes.len();
+        record(self)?;
+        let mut all = Pass {
+            name: name.to_owned(),
+            uses: Vec::new(),
+            pipelines: Vec::new(),
+            work: RecordedWork::Record(Box::new(|_, _, _| ())),
+        };
+        let mut body = Vec::new();
+        for pass in self.passes.drain(before..) {
+            let RecordedWork::Dispatch(dispatch) = pass.work else {
+                panic!("{name} repeats {}, no dispatch", pass.name)
+            };
+            all.uses.extend(pass.uses);
+            all.pipelines.extend(pass.pipelines);
+            body.push(dispatch);
+        }
+        for groups in left {
+            self.use_buffer(&mut all.uses, groups.sizes, Access::TransferSrc, vk::ShaderStageFlags::empty());
+        }
+        all.work = RecordedWork::Repeat(Repeat { body, left });
+        self.passes.push(all);
+        Ok(())
+    }
+
     /// One dispatch with an invocation per pixel of `size` (rounded up to workgroups).
     ///
     /// # Errors
@@ -517,14 +558,16 @@ impl<'a> Frame<'a> {
 
     /// Makes the device's writes to a buffer visible to [`Buffer::read`].
     pub fn read_back(&mut self, buffer: &'a Buffer) {
+        let read = match &buffer.host_copy {
+            Some(copy) => {
+                self.copy_buffer("read back", buffer, copy, buffer.bytes());
+                copy
+            }
+            None => buffer,
+        };
         let mut uses = Vec::new();
-        self.use_buffer(&mut uses, buffer, Access::HostRead, vk::ShaderStageFlags::empty());
-        self.passes.push(Pass {
-            name: "read back".to_owned(),
-            uses,
-            pipelines: Vec::new(),
-            work: RecordedWork::Record(Box::new(|_, _, _| {})),
-        });
+        self.use_buffer(&mut uses, read, Access::HostRead, vk::ShaderStageFlags::empty());
+        self.transfer("read back", uses, |_, _| ());
     }
 
     /// The descriptions of the passes so far, in order.
@@ -575,6 +618,7 @@ impl<'a> Frame<'a> {
         let keys: Vec<&PipelineKey> = wanted.iter().collect();
         let count = 2 * passes.len() as u32;
         let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(count.max(1));
+        let repeats = passes.iter().any(|pass| matches!(pass.work, RecordedWork::Repeat(_)));
         // SAFETY: command buffers are recorded here, submitted once, and waited for before anything is freed. Every
         // handle in them is borrowed for `'a`, which ends after this function.
         let outcome = unsafe {
@@ -586,7 +630,7 @@ impl<'a> Frame<'a> {
                 let (device, from, targets) = (&device, *from, &targets);
                 let begun = &begun;
                 let recording = Recording { device, from, targets, pipelines, queries, without_barriers, begun };
-                if device.time_slices.slice_ms.is_some() {
+                if device.time_slices.slice_ms.is_some() || repeats {
                     recording.in_turns(passes, &barriers)
                 } else {
                     recording.at_once(passes, &barriers)

@@ -3,7 +3,7 @@
 //! Read the Vulkan specification, chapter Limits.
 
 /// Push descriptors of a pass (`maxPushDescriptors`); every device with the extension allows 32 or more.
-pub const PUSH_DESCRIPTORS: u32 = 12;
+pub const PUSH_DESCRIPTORS: u32 = 16;
 /// Storage images and storage texel buffers in one shader stage.
 pub const STORAGE_IMAGES: u32 = 16;
 /// Storage buffers in one shader stage.

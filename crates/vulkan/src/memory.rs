@@ -23,6 +23,9 @@ pub enum Place {
     Upload,
     /// Host-visible memory that the device writes and the host reads.
     Readback,
+    /// Device-local memory that shaders add to, and a copy that the host reads ([`Frame::read_back`](crate::Frame::read_back)):
+    /// additions across the bus of a GPU are slow.
+    Counters,
 }
 
 /// A buffer with its memory.
@@ -33,6 +36,8 @@ pub struct Buffer {
     pub(super) state: Mutex<ResourceState>,
     bytes: u64,
     allocation: Mutex<Option<Allocation>>,
+    /// What the host reads of [`Place::Counters`].
+    pub(super) host_copy: Option<Box<Buffer>>,
     device: Arc<Device>,
 }
 
@@ -132,9 +137,13 @@ impl Buffer {
         if texels.is_some() {
             usage |= vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
         }
+        let host_copy = match place {
+            Place::Counters => Some(Box::new(Self::new(device, name, bytes, Place::Readback)?)),
+            Place::Device | Place::Upload | Place::Readback => None,
+        };
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         let location = match place {
-            Place::Device => MemoryLocation::GpuOnly,
+            Place::Device | Place::Counters => MemoryLocation::GpuOnly,
             Place::Upload => MemoryLocation::CpuToGpu,
             Place::Readback => MemoryLocation::GpuToCpu,
         };
@@ -156,6 +165,7 @@ impl Buffer {
                 state: Mutex::default(),
                 bytes,
                 allocation: Mutex::new(None),
+                host_copy,
                 device: device.clone(),
             };
             let bound = device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset());
@@ -196,11 +206,14 @@ impl Buffer {
         mapped[offset..offset + data.len()].copy_from_slice(data);
     }
 
-    /// Calls `read` with the bytes of a readback buffer, after the frame that wrote them has finished.
+    /// Calls `read` with the bytes of a buffer that a frame has read back, after that frame has finished.
     ///
     /// # Panics
     /// When the buffer is not host-visible, a bug of the caller.
     pub fn read<R>(&self, read: impl FnOnce(&[u8]) -> R) -> R {
+        if let Some(copy) = &self.host_copy {
+            return copy.read(read);
+        }
         let allocation = lock(&self.allocation);
         let mapped = allocation.as_ref().and_then(Allocation::mapped_slice).expect("a readback buffer is mapped");
         read(&mapped[..self.bytes as usize])

@@ -41,6 +41,8 @@ pub(super) struct PassPace {
     pub(super) per_group_ms: f64,
     /// Milliseconds of each occurrence in the last frame that had it.
     pub(super) last_ms: Vec<f64>,
+    /// Of repeated dispatches: milliseconds of each when it was submitted alone, and how often all were repeated last.
+    pub(super) repeated: (Vec<f64>, usize),
 }
 
 impl SliceTimes {

@@ -34,6 +34,8 @@ pub(super) struct Pass<'a> {
 pub(super) enum RecordedWork<'a> {
     /// A dispatch, which time-sliced submission may split.
     Dispatch(Dispatch<'a>),
+    /// Dispatches that are repeated, in several submissions.
+    Repeat(Repeat<'a>),
     /// Any other commands.
     Record(Record<'a>),
 }
@@ -55,6 +57,16 @@ pub(super) struct Dispatch<'a> {
     pub(super) push: Vec<u8>,
     pub(super) groups: Groups<'a>,
 }
+
+/// Dispatches that are repeated in order until the device has no more work for them.
+pub(super) struct Repeat<'a> {
+    pub(super) body: Vec<Dispatch<'a>>,
+    /// When both have no workgroups after the last dispatch of the body, it was repeated often enough.
+    pub(super) left: [IndirectGroups<'a>; 2],
+}
+
+/// Why a repeated dispatch cannot be recorded with the other passes of a frame.
+pub(super) const REPEATED: &str = "repeated dispatches need a check by the host";
 
 impl Dispatch<'_> {
     /// Records the dispatch, or a piece of it.
@@ -168,6 +180,7 @@ impl Recording<'_> {
                     match pass.work {
                         RecordedWork::Record(record) => record(device, commands, &made),
                         RecordedWork::Dispatch(work) => work.record(device, commands, made[0], None),
+                        RecordedWork::Repeat(_) => unreachable!("{REPEATED}"),
                     }
                     if timed {
                         raw.cmd_write_timestamp2(commands, ALL, queries, 2 * index as u32 + 1);

@@ -12,15 +12,15 @@ use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use ash::vk;
 
 use super::device::{Device, lock};
 use super::memory::{Buffer, Place};
 use super::pace::{OF_FRAME, PassPace};
 use super::recording::{
-    ALL, Dispatch, DispatchPiece, Groups, IndirectGroups, Pass, RecordedWork, Recording, begin, label, record_barriers,
-    submit, wait, write_first_timestamp,
+    ALL, Dispatch, DispatchPiece, Groups, IndirectGroups, Pass, REPEATED, RecordedWork, Recording, Repeat, begin,
+    label, record_barriers, submit, wait, write_first_timestamp,
 };
 use super::sync::Barrier;
 
@@ -109,7 +109,9 @@ impl PassEstimate {
             RecordedWork::Dispatch(Dispatch { groups: Groups::Indirect(groups), .. }) if pace.per_group_ms > 0.0 => {
                 pace.per_group_ms * groups.most as f64
             }
-            RecordedWork::Dispatch(Dispatch { groups: Groups::Indirect(_), .. }) => return None,
+            RecordedWork::Dispatch(Dispatch { groups: Groups::Indirect(_), .. }) | RecordedWork::Repeat(_) => {
+                return None;
+            }
             _ => ms,
         };
         Some(Self { ms, most_ms: GROWTH * most.max(ms) })
@@ -118,6 +120,31 @@ impl PassEstimate {
     fn fits(self, slice_ms: f64) -> bool {
         self.ms <= slice_ms && self.most_ms <= LONGEST_MS
     }
+}
+
+/// How many of a body's `all` repeated dispatches are submitted together from the `at`th on: one while its time is not known,
+/// 0 where one alone is longer than a slice, otherwise as many whole bodies as are probably left and fit a slice. `paces`
+/// are the dispatches' times, and `often` is how often the body was repeated last.
+fn together(paces: &[f64], all: usize, at: usize, often: usize, slice_ms: f64) -> usize {
+    let (next, done) = (at % all, at / all);
+    if paces.len() < all {
+        return 1;
+    }
+    if paces[next] > slice_ms {
+        return 0;
+    }
+    let mut sum = 0.0;
+    let fit = paces[next..].iter().take_while(|ms| {
+        sum += **ms;
+        sum <= slice_ms
+    });
+    let fit = fit.count();
+    if fit < all - next {
+        return fit;
+    }
+    let left = if often > done { often - done } else { done.div_ceil(4).max(1) };
+    let more = ((slice_ms - sum) / paces.iter().sum::<f64>().max(1e-3)) as usize;
+    fit + more.min(left - 1) * all
 }
 
 /// Time of a submission in milliseconds.
@@ -155,7 +182,7 @@ impl Recording<'_> {
 
     unsafe fn draw_all(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>], drawn: &mut Drawn) -> Result<()> {
         let slice_ms = self.device.time_slices.slice_ms.unwrap_or(LONGEST_MS);
-        let room = Buffer::new(self.device, OF_FRAME, GROUPS_BYTES * passes.len().max(1) as u64, Place::Readback)?;
+        let room = Buffer::new(self.device, OF_FRAME, GROUPS_BYTES * passes.len().max(2) as u64, Place::Readback)?;
         let mut seen: HashMap<String, usize> = HashMap::new();
         let mut batch: Option<Batch> = None;
         for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
@@ -237,6 +264,7 @@ impl Recording<'_> {
             match pass.work {
                 RecordedWork::Record(record) => record(self.device, commands, &made),
                 RecordedWork::Dispatch(work) => work.record(self.device, commands, made[0], None),
+                RecordedWork::Repeat(_) => unreachable!("{REPEATED}"),
             }
             self.device.raw.cmd_write_timestamp2(commands, ALL, self.queries, query + 1);
             label(self.device, commands, None);
@@ -309,8 +337,14 @@ impl Recording<'_> {
                     let took = self.turn(&pass.name, first, |commands| record(self.device, commands, &made))?;
                     return Ok(took.ms);
                 }
+                RecordedWork::Repeat(work) => return self.repeated(&pass.name, &work, &made, room, first),
                 RecordedWork::Dispatch(work) => work,
             };
+            // Pipelines of devices that nothing resets take whole dispatches alone.
+            if self.device.time_slices.slice_ms.is_none() {
+                let record = |commands| work.record(self.device, commands, made[0], None);
+                return Ok(self.turn(&pass.name, first, record)?.ms);
+            }
             let known = lock(&self.device.time_slices.paces).get(&pass.name).map(|pace| pace.per_group_ms);
             let groups = match work.groups {
                 Groups::Count(groups) => groups,
@@ -319,6 +353,75 @@ impl Recording<'_> {
             drawn.groups[index] = Some(Known::Now(groups.into_iter().map(u64::from).product()));
             self.pieces(&pass.name, &work, made[0], groups, known, first)
         }
+    }
+
+    /// Submits repeated dispatches, as many together as take about a slice, until there is no more work; their GPU time in
+    /// milliseconds.
+    unsafe fn repeated(
+        &self,
+        name: &str,
+        work: &Repeat<'_>,
+        pipelines: &[vk::Pipeline],
+        room: &Buffer,
+        first: impl Fn(vk::CommandBuffer),
+    ) -> Result<f64> {
+        let Repeat { body, left } = work;
+        let slice_ms = self.device.time_slices.slice_ms.unwrap_or(f64::INFINITY);
+        let known = lock(&self.device.time_slices.paces).get(name).map(|pace| pace.repeated.clone());
+        let (mut paces, often) = known.unwrap_or_default();
+        let is_left = |commands| {
+            for (groups, place) in left.iter().zip([0, GROUPS_BYTES]) {
+                // SAFETY: the caller of `in_turns` keeps all handles alive.
+                unsafe { self.copy_groups(commands, *groups, room, place) };
+            }
+            // SAFETY: the command buffer is recording.
+            unsafe { to_host(self.device, commands) };
+        };
+        let (mut at, mut total) = (0, 0.0);
+        loop {
+            let next = at % body.len();
+            let before = |commands| match at {
+                0 => first(commands),
+                // SAFETY: the command buffer is recording.
+                _ => unsafe { after_all(self.device, commands) },
+            };
+            let count = together(&paces, body.len(), at, often, slice_ms);
+            if count == 0 {
+                let Groups::Indirect(groups) = body[next].groups else {
+                    bail!("{name} has a dispatch that takes too long")
+                };
+                // SAFETY: the caller of `in_turns` keeps all handles alive.
+                unsafe {
+                    let groups = self.read_groups(groups, room)?;
+                    total += self.pieces(name, &body[next], pipelines[next], groups, None, before)?;
+                    self.turn(name, |_| (), is_left)?;
+                }
+            } else {
+                let record = |commands| {
+                    for i in (at..at + count).map(|i| i % body.len()) {
+                        // SAFETY: as above.
+                        unsafe {
+                            body[i].record(self.device, commands, pipelines[i], None);
+                            between_dispatches(self.device, commands);
+                        }
+                    }
+                    is_left(commands);
+                };
+                // SAFETY: as above.
+                let took = unsafe { self.turn(name, before, record)? };
+                total += took.ms;
+                if next == paces.len() {
+                    paces.push(took.believed_ms());
+                }
+            }
+            at += count.max(1);
+            let groups: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[..2 * GROUPS_BYTES as usize]));
+            if at % body.len() == 0 && groups[0] == 0 && groups[3] == 0 {
+                break;
+            }
+        }
+        lock(&self.device.time_slices.paces).entry(name.to_owned()).or_default().repeated = (paces, at / body.len());
+        Ok(total)
     }
 
     /// Submits a dispatch in pieces; its GPU time in milliseconds.
@@ -465,6 +568,19 @@ impl Drawn {
     }
 }
 
+/// Makes the writes of a dispatch available to the next one, and to the sizes of an indirect one.
+unsafe fn between_dispatches(device: &Device, commands: vk::CommandBuffer) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER)
+        .src_access_mask(vk::AccessFlags2::SHADER_WRITE)
+        .dst_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER | vk::PipelineStageFlags2::DRAW_INDIRECT)
+        .dst_access_mask(
+            vk::AccessFlags2::SHADER_READ | vk::AccessFlags2::SHADER_WRITE | vk::AccessFlags2::INDIRECT_COMMAND_READ,
+        )];
+    // SAFETY: the command buffer is recording.
+    unsafe { device.raw.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&barrier)) };
+}
+
 /// Makes copies available to the host.
 unsafe fn to_host(device: &Device, commands: vk::CommandBuffer) {
     let barrier = [vk::MemoryBarrier2::default()
@@ -490,6 +606,21 @@ unsafe fn after_all(device: &Device, commands: vk::CommandBuffer) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn repeated_dispatches_are_together_as_far_as_a_slice_goes() {
+        let body = [1.0, 4.0, 2.0, 3.0];
+        // At first one by one.
+        assert_eq!((0..4).map(|known| together(&body[..known], 4, known, 0, 100.0)).sum::<usize>(), 4);
+        // Then a quarter more each time, to the end of a body.
+        assert_eq!([4, 16, 40].map(|at| together(&body, 4, at, 0, 1e3)), [4, 4, 12]);
+        // What was needed before, if it fits.
+        assert_eq!([0, 4].map(|at| together(&body, 4, at, 7, 1e3)), [28, 24]);
+        assert_eq!(together(&body, 4, 0, 7, 35.0), 12);
+        // Less than a body, from within it, and none where one is too long.
+        assert_eq!([0, 2, 3].map(|at| together(&body, 4, at, 7, 7.0)), [3, 2, 1]);
+        assert_eq!([0, 1, 2].map(|at| together(&body, 4, at, 7, 3.5)), [1, 0, 1]);
+    }
 
     #[test]
     fn pieces_are_every_group_once() {
