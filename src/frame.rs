@@ -555,13 +555,14 @@ impl Renderer {
             ambient(&mut frame, lighting, g, work, directions, radiance)?;
         }
         background(&mut frame, lighting, g, work, radiance)?;
+        let trees = (&self.targets.ray_tiles, self.targets.ray_trees.as_ref());
         if let Some(with) = plan.rays.filter(|rays| rays.mirrors || rays.refraction) {
-            interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, radiance, None)?;
+            interact(&mut frame, lighting, with, g, trees, radiance, None)?;
         }
         for part in parts {
             frame.clear("reset part", &part.radiance);
             if let Some(with) = plan.rays.filter(|_| part.part.called_for(plan)) {
-                interact(&mut frame, lighting, with, g, &self.targets.ray_tiles, &part.radiance, Some(part.part))?;
+                interact(&mut frame, lighting, with, g, trees, &part.radiance, Some(part.part))?;
             }
             if plan.screen.refraction {
                 frame.download("copy part", &part.radiance, &part.seen);

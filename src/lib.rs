@@ -27,7 +27,7 @@
 //! 4. [`gpu::sync::barriers`] derives the pipeline barriers of the whole frame from the passes' declared accesses.
 //!
 //! Rays traverse the BVH of [`transport::bvh`], in the memory layout of [`upload::rays`], by `shaders/lib/trace.glsl`.
-//! `shaders/pass/interact.comp` is the recursive ray tree of reflection and refraction, `shaders/lib/shadow.glsl` the
+//! `shaders/lib/ray_tree.glsl` is the recursive ray tree of reflection and refraction, `shaders/lib/shadow.glsl` the
 //! shadow rays.
 //!
 //! [`spectra`] has spectra of light and matter. [`scene::wavelengths`] turns a scene into the same scene in one band of

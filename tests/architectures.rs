@@ -78,6 +78,15 @@ fn by_rays() {
     by_rays_are_the_same(&settings(Model::Recursive, &["samples=1"]), &SCENES);
 }
 
+/// Far fewer ray trees than pixels: complete trees make room for those of other pixels, many times.
+#[test]
+fn by_rays_with_few_trees_at_a_time() {
+    let few = Settings { ray_trees: Some(128), ..settings(Model::Recursive, &["samples=1"]) };
+    by_rays_are_the_same(&few, &["etalon", "nested"]);
+    let share = TileShare { index: 1, of: 3 };
+    by_rays_are_the_same(&Settings { share, ..few }, &["pool"]);
+}
+
 #[test]
 fn by_paths() {
     are_the_same(&settings(Model::Global, &["samples=4"]), &SCENES);

@@ -661,7 +661,7 @@ struct Paths<'a> {
     events: Vec<(usize, DVec3)>,
 }
 
-/// Branches that weigh less are not followed (shaders/pass/interact.comp).
+/// Branches that weigh less are not followed (shaders/lib/ray_tree.glsl).
 const FAINTEST: f64 = 1.0 / 512.0;
 
 impl<'a> Paths<'a> {

@@ -528,13 +528,14 @@ fn the_light_hierarchy_brings_its_nodes() {
     let [without, with] = Case { environments: [None, None], choices: paths, brings, same: false, ..case }.check();
     // Emitters of 16 bytes and nodes of 32: two emitters; the bin, three emitters and five nodes.
     // Tables of GPUs have sizes of their own.
-    if Gpu::open().device.is_software() {
+    let sizes_are_known = Gpu::open().device.is_software();
+    if sizes_are_known {
         assert_eq!([&without, &with].map(|drawn| emitters(drawn, &one) + 16), [2 * 16, 4 * 16 + 5 * 32]);
     }
     // Where it is a knob's choice, and not of the lights that have no place.
     let switched_off = draw(&lit(3, lamp).0, None, &["indirect=path", "light-sampler=power"]);
     assert_eq!(state(&switched_off.plan, "light hierarchy"), ("switched off", "light-sampler=power".to_owned()));
-    assert_eq!(emitters(&switched_off, &one) + 16, 3 * 16);
+    assert!(!sizes_are_known || emitters(&switched_off, &one) + 16 == 3 * 16);
     let sun = LightKind::Directional { direction: DVec3::NEG_Y };
     assert_eq!(state(&draw(&lit(3, sun).0, None, paths).plan, "light hierarchy"), ("not needed", reason.to_owned()));
     let apart = draw(&lit(3, lamp).0, None, &["indirect=ambient"]);

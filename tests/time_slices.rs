@@ -9,27 +9,31 @@ use etalon::scene::environment::Environment;
 use etalon::study;
 use etalon_testing::gpu::{Gpu, bits};
 
-/// Scenes with the model that they are drawn by, and rungs.
-const PICTURES: &[(&str, Model, &[&str])] = &[
+/// Scenes with the model that they are drawn by, rungs, and the form of the passes.
+const PICTURES: &[(&str, Model, &[&str], Architecture)] = &[
     // Lists per tile of 683 lights.
-    ("lamps", Model::Local, &["samples=1"]),
+    ("lamps", Model::Local, &["samples=1"], Architecture::Cpu),
     // Mirrors on the screen and transparent surfaces.
-    ("blend", Model::Local, &["reflection=screen", "refraction=screen", "samples=1"]),
+    ("blend", Model::Local, &["reflection=screen", "refraction=screen", "samples=1"], Architecture::Cpu),
     // Rays.
-    ("etalon", Model::Recursive, &["samples=4"]),
+    ("etalon", Model::Recursive, &["samples=4"], Architecture::Cpu),
+    // Ray trees, whose number of steps the host does not know.
+    ("etalon", Model::Recursive, &["samples=4"], Architecture::Gpu),
     // Queues of paths.
-    ("cornell", Model::Global, &["samples=4"]),
+    ("cornell", Model::Global, &["samples=4"], Architecture::Cpu),
 ];
 
 type Bits = Vec<[u32; 4]>;
 
 /// Films of all pictures, each drawn twice in a row: the second time knows how long passes take.
 fn films(gpu: &Gpu) -> Vec<[Bits; 2]> {
-    let draw = |(name, model, rungs): &(&str, Model, &[&str])| {
+    let draw = |(name, model, rungs, architecture): &(&str, Model, &[&str], Architecture)| {
         let scene = study::load(name).expect("a scene");
         let mut knobs = Knobs::of(*model);
         rungs.iter().for_each(|rung| knobs.set(rung).expect("a rung"));
-        let settings = Settings { size: [176, 99], knobs, ..Settings::default() };
+        let form = Some(*architecture);
+        let settings =
+            Settings { size: [176, 99], knobs, architecture: form, ray_trees: Some(4096), ..Settings::default() };
         let environment = scene.studio.map(|_| Environment::studio());
         let mut renderer = gpu.renderer(&scene, environment.as_ref(), settings);
         [(); 2].map(|()| {

@@ -197,6 +197,11 @@ struct HitSurface {
 
 #define TEXEL(page, slot) hit_texture_or(id, slot, point.uvs, footprint, vec4(1.0))
 
+// A triangle's normal on the side that a ray comes from.
+vec3 facing(vec3 n, vec3 direction) {
+    return dot(n, direction) <= 0.0 ? n : -n;
+}
+
 // The surface seen along `direction` by a ray (cone) of diameter `width` at the hit.
 HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     HitSurface r;
@@ -227,7 +232,7 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     }
     r.front = dot(point.n, direction) <= 0.0;
     float side = r.front ? 1.0 : -1.0;
-    r.n = side * point.n;
+    r.n = facing(point.n, direction);
     r.coverage = coverage_of(m, t.base.a);
     r.sheet = point.sheet;
     r.material = id;

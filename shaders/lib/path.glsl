@@ -128,6 +128,32 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
     return shadow_ray;
 }
 
+// Weight of the emission of a surface that the path has found itself, of normal n: the power heuristic.
+float weight_of_emission(Path p, Hit found, vec3 n) {
+    float r = p.distance_since_vertex + found.t;
+    float cos_light = max(abs(dot(n, p.direction)), 1e-9);
+    // The last vertex for MIS lies straight behind: what the path has met since did not deflect it.
+    vec3 last_vertex = p.origin - p.direction * p.distance_since_vertex;
+    float drawn = density_per_solid_angle(light_pdf_area(found.triangle, last_vertex, p.pdf > 0.0), r * r, cos_light);
+    return p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, float(LIGHT_SAMPLES) * drawn) : 1.0;
+}
+
+// The first light sample of a vertex whose shadow rays start at `origin`.
+LightSample draw_first_light(Path p, vec3 origin, uvec2 pixel) {
+    return sample_light(origin, dimension_words_of(pixel, p.state & PATH_SURFACES, DIMENSION_LIGHT, 0, LIGHT_SAMPLES));
+}
+
+// A photon near a vertex; none where it is not wanted.
+PhotonSample draw_photon(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted) {
+    float chooses = unit_float(dimension_words(pixel, (p.state & PATH_SURFACES) + 1, DIMENSION_PHOTON).x);
+    return sample_photons(p_bvh, n, chooses, wanted);
+}
+
+// All three as the program has them: computed where they are needed, or before (path_sample.comp).
+float emission_weight(Path p, Hit found, vec3 n);
+LightSample first_light(Path p, vec3 origin, uvec2 pixel);
+PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted);
+
 // Shades one path vertex. Returns the radiance gathered there; also gives the shadow ray still to be traced, and the
 // continued path p.
 // Steps: 1. the vertex; 2. next event estimation; light found by the path itself: 3a. the environment, 3b. emission
@@ -151,7 +177,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     LightSample light = LightSample(p.direction, -1.0, vec3(0.0), 0.0);
     bool scatters = at_surface && !passed_by && !hit.s.unlit && (!b.delta || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_delta));
     vec3 front_origin = ray_origin(hit.s.p_bvh, hit.n, hit.s.v);
-    if (EMITTERS > 0) light = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, 0, LIGHT_SAMPLES));
+    if (EMITTERS > 0) light = first_light(p, front_origin, pixel);
     // 3a. Light found by the path itself: the environment, weighted by the power heuristic.
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
@@ -174,15 +200,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         // Single-sided surfaces emit on their front alone.
         bool shows = EMISSIVE_LIGHTS || (p.state & PATH_NON_SPECULAR) == 0;
         shows = shows && (hit.s.unlit || hit.front || (hit_material(vertex.leaf) & ONE_SIDED_TRIANGLE) == 0);
-        float w = 1.0;
-        if (EMISSIVE_TRIANGLES) {
-            float r = p.distance_since_vertex + found.t;
-            float cos_light = max(abs(dot(hit.n, p.direction)), 1e-9);
-            // The last vertex for MIS lies straight behind: what the path has met since did not deflect it.
-            vec3 last_vertex = p.origin - p.direction * p.distance_since_vertex;
-            float drawn = density_per_solid_angle(light_pdf_area(vertex.leaf, last_vertex, p.pdf > 0.0), r * r, cos_light);
-            w = p.pdf > 0.0 && drawn > 0.0 ? mis_weight(p.pdf, float(LIGHT_SAMPLES) * drawn) : 1.0;
-        }
+        float w = EMISSIVE_TRIANGLES ? emission_weight(p, Hit(found.t, vertex.leaf, 0.0, 0.0), hit.n) : 1.0;
         gathered = shows ? p.throughput * emits * w : vec3(0.0);
         ends = ends || hit.s.unlit;
     }
@@ -196,11 +214,8 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     }
     uvec2 words = dimension_words(pixel, vertices_before, DIMENSION_DIRECTION);
     BsdfSample drawn = bsdf_sample(vertex.bsdf, vertex.x, vec2(unit_float(words.x), unit_float(words.y)));
-    PhotonSample photon = PhotonSample(p.direction, vec3(0.0));
-    if (PHOTON_MAP) {
-        float chooses = unit_float(dimension_words(pixel, vertices_before + 1, DIMENSION_PHOTON).x);
-        photon = sample_photons(hit.s.p_bvh, hit.n, chooses, scatters && alive);
-    }
+    PhotonSample photon = PhotonSample(0u, vec3(0.0));
+    if (PHOTON_MAP) photon = photon_near(p, hit.s.p_bvh, hit.n, pixel, scatters && alive);
     // First towards the light samples, then to a photon, at last along the path, in a loop: the code exists once.
     PathEval towards_light = PathEval(vec3(0.0), 0.0, 0.0);
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
@@ -218,7 +233,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
             }
             towards = normalize(sampled.to_light);
         }
-        if (PHOTON_MAP && i == LIGHT_SAMPLES) towards = photon.to_light;
+        if (PHOTON_MAP && i == LIGHT_SAMPLES) towards = to_light_of(photon);
         PathEval now = bsdf_evaluate(vertex.bsdf, towards);
         if (i == 0) towards_light = now;
         on_path = now;

@@ -5,6 +5,18 @@
 #define PATH_PAIR_GLSL
 #include "lib/path.glsl"
 
+float emission_weight(Path p, Hit found, vec3 n) {
+    return weight_of_emission(p, found, n);
+}
+
+LightSample first_light(Path p, vec3 origin, uvec2 pixel) {
+    return draw_first_light(p, origin, pixel);
+}
+
+PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted) {
+    return draw_photon(p, p_bvh, n, pixel, wanted);
+}
+
 // One bounce of two paths: their rays are traced in pairs, their surfaces shaded one after the other, so that the code
 // exists once.
 void bounce(inout Path a, inout Path b, uvec2 pixel_a, uvec2 pixel_b) {

@@ -8,7 +8,7 @@
 layout(constant) const bool KEEPS_MEDIA = false; // paths cross media
 layout(constant) const bool KEEPS_T_MIN = false; // some interface coincides with an opaque surface
 
-layout(pass, scalar) buffer Origins { uvec4 origins[]; };          // origin, source_face
+layout(pass, scalar) buffer Origins { uvec4 origins[]; };          // origin, source_face (path_sample.comp: weight of emission)
 layout(pass, scalar) buffer Directions { uvec4 directions[]; };    // direction, pdf
 layout(pass, scalar) buffer Throughputs { uvec4 throughputs[]; };  // throughput, state
 layout(pass, scalar) buffer Sums { uvec4 sums[]; };                // sum, distance_since_vertex

@@ -1,8 +1,8 @@
 // Path tracing in steps of one path per invocation: what they leave for each other in memory.
-// Each bounce is three dispatches over the queue: path_extend.comp traces the rays, path_shade.comp shades what they hit and
-// appends the surviving paths to the next queue, path_shadow.comp traces the shadow rays. So most kernels either traverse or
-// shade, and need the registers of one of both. Shading traverses where surfaces coincide and for light samples beyond the
-// first; shadow rays shade the surfaces that filter light.
+// Each bounce is four dispatches over the queue: path_extend.comp traces the rays, path_sample.comp draws a light sample at
+// what they hit, path_shade.comp shades it and appends the surviving paths to the next queue, path_shadow.comp traces the
+// shadow rays. So most kernels traverse, or search lights, or shade, and need the registers of one of these. Shading
+// traverses where surfaces coincide and for light samples beyond the first; shadow rays shade the surfaces that filter light.
 // Where to read: Laine, Karras and Aila, Megakernels Considered Harmful, HPG 2013; pbrt 4, chapter 15;
 // docs/decisions/architectures.md.
 #ifndef PATH_STEPS_GLSL

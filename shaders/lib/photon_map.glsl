@@ -17,7 +17,7 @@ layout(paths, rgba32ui) readonly uniform uimageBuffer photon_map; // nodes, then
 
 // Light from one photon, which stands for all whose disks cover the vertex.
 struct PhotonSample {
-    vec3 to_light; // unit vector
+    uint to_light; // direction, as the photon has it
     vec3 arriving; // irradiance perpendicular to it, over the probability of the photon
 };
 
@@ -31,6 +31,10 @@ vec3 irradiance_of(Photon photon, vec3 p, vec3 n) {
     float share = 1.0 - across2 / (radius * radius);
     bool covers = share > 0.0 && abs(height) <= DISK_THICKNESS * radius && abs(dot(n, normal)) >= SAME_SURFACE;
     return covers ? photon.irradiance * share : vec3(0.0);
+}
+
+vec3 to_light_of(PhotonSample photon) {
+    return unit_from_octahedral(unpackSnorm2x16(photon.to_light));
 }
 
 // Draws one of the photons that cover a point, in proportion to what it brings (weighted reservoir sampling, Chao 1982).
@@ -65,6 +69,6 @@ PhotonSample sample_photons(vec3 p, vec3 n, float x, bool wanted) {
         }
         at = goes_on ? inside ? at + 1 : node.next : at;
     } while (goes_on);
-    return PhotonSample(unit_from_octahedral(unpackSnorm2x16(chosen)), brought * (sum / chosen_weight));
+    return PhotonSample(chosen, brought * (sum / chosen_weight));
 }
 #endif

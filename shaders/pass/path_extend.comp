@@ -1,4 +1,4 @@
-// Path tracing in steps, 1 of 3: traces the ray of each path to its next vertex.
+// Path tracing in steps, 1 of 4: traces the ray of each path to its next vertex.
 // Where to read: lib/path_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,4 +1,4 @@
-// Path tracing in steps, 2 of 3: shades the vertex of each path, and appends the paths that go on to the next queue.
+// Path tracing in steps, 3 of 4: shades the vertex of each path, and appends the paths that go on to the next queue.
 // The order of the next queue varies from run to run. Each path adds to its own pixel alone, so the film does not.
 // Where to read: lib/path_steps.glsl.
 #version 460
@@ -8,8 +8,25 @@
 layout(local_size_x = 64) in;
 #include "lib/path_shadow_ray.glsl"
 
+// By path_sample.comp.
+uint entry;
+
+float emission_weight(Path p, Hit found, vec3 n) {
+    return uintBitsToFloat(origins[entry].w);
+}
+
+LightSample first_light(Path p, vec3 origin, uvec2 pixel) {
+    return stored_light(entry);
+}
+
+PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted) {
+    PhotonSample photon = stored_photon(entry);
+    if (!wanted) photon.arriving = vec3(0.0);
+    return photon;
+}
+
 void main() {
-    uint entry = own_entry();
+    entry = own_entry();
     bool alive = (entry & TERMINATED) == 0;
     bool goes_on = false;
     if (alive) {
@@ -25,17 +42,6 @@ void main() {
         if (EMITTERS > 0) store_shadow_ray(shadow_ray, entry);
         goes_on = (p.state & PATH_ALIVE) != 0;
     }
-    // Three atomics per subgroup. `base` is 0 but in the invocation that added, so the maximum passes it to all.
-    uint before = subgroupExclusiveAdd(goes_on ? 1u : 0u);
-    uint appended = subgroupAdd(goes_on ? 1u : 0u);
-    uint base = 0;
-    if (subgroupElect() && appended > 0) {
-        base = atomicAdd(sizes[bounce + 1].count, appended);
-        uint groups = (base + appended + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x;
-        atomicMax(sizes[bounce + 1].x, min(groups, ROW));
-        atomicMax(sizes[bounce + 1].y, (groups + ROW - 1) / ROW);
-    }
-    base = subgroupMax(base);
-    if (goes_on) queues[((bounce + 1) & 1u) * places + base + before] = entry;
+    APPEND_TO_QUEUE(sizes[bounce + 1], queues, ((bounce + 1) & 1u) * places, goes_on, entry)
     count_paths(0, lost, most_lost);
 }

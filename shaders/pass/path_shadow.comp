@@ -1,4 +1,4 @@
-// Path tracing in steps, 3 of 3: traces the shadow ray of each path, and adds the light that arrives.
+// Path tracing in steps, 4 of 4: traces the shadow ray of each path, and adds the light that arrives.
 // Where to read: lib/path_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require

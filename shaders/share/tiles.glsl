@@ -17,4 +17,11 @@ struct QueueSize {
     WorkSize paths;  // two paths per invocation; `count` is the number of entries
     WorkSize chunks; // one invocation per chunk of entries
 };
+
+// Sizes of the dispatches of one step of reflection and refraction, one ray tree per invocation.
+struct StepSizes {
+    WorkSize beginning; // trees of the pixels that are next
+    WorkSize growing;   // trees that follow a branch
+    WorkSize met;       // trees whose branch has met a surface
+};
 #endif

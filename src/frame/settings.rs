@@ -94,6 +94,9 @@ pub struct Settings {
     pub traversal: Option<Traversal>,
     /// Architecture of the passes; `None` selects the one that suits the device.
     pub architecture: Option<Architecture>,
+    /// Ray trees that grow at the same time, at least 64, in the form of reflection and refraction for GPUs; `None`: as many as
+    /// a share of the device's memory holds.
+    pub ray_trees: Option<u32>,
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,
     /// Parts of the picture that are stored as layers of their own; each costs one more pass of the recursive rays.
@@ -117,6 +120,7 @@ impl Default for Settings {
             max_error: None,
             traversal: None,
             architecture: None,
+            ray_trees: None,
             forced: ForcedEffects::default(),
             parts: Vec::new(),
             share: TileShare::ALL,

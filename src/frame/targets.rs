@@ -13,6 +13,7 @@ use crate::pass::fragments::FragmentLists;
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::part::PartOnDevice;
 use crate::pass::path::PathsOnDevice;
+use crate::pass::ray_trees::RayTrees;
 use crate::pass::screen::OnScreen;
 use crate::pass::sum::Sum;
 use crate::pass::tiles::Tiles;
@@ -22,6 +23,7 @@ use crate::plan::Plan;
 /// All resources whose size depends on the picture's.
 pub(super) struct Targets {
     pub(super) ray_tiles: RayTiles,
+    pub(super) ray_trees: Option<RayTrees>,
     pub(super) gbuffer: GBuffer,
     pub(super) tiles: Tiles,
     pub(super) work: WorkLists,
@@ -57,6 +59,7 @@ impl Targets {
         let is_sum = sums.is_empty() || (sums.len() == 1 && sums[0].is_plain());
         Ok(Self {
             ray_tiles: RayTiles::new(device, plan, size)?,
+            ray_trees: RayTrees::new(device, plan, size, settings.ray_trees)?,
             gbuffer: GBuffer::new(device, plan, size)?,
             tiles: Tiles::new(device, plan, size)?,
             work: WorkLists::new(device, size, settings.share)?,

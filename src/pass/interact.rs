@@ -1,5 +1,5 @@
-//! Recursive ray tracing of reflection and refraction, by indirect dispatch over ray tiles
-//! (shaders/pass/interact.comp).
+//! Recursive ray tracing of reflection and refraction, over the tiles whose surfaces send rays: one kernel that follows a
+//! pixel's whole ray tree (shaders/pass/interact.comp), or trees that grow in steps (ray_trees.rs).
 //!
 //! Read Whitted 1980, "An Improved Illumination Model for Shaded Display"; Schmidt and Budge 2002, "Simple Nested
 //! Dielectrics in Ray Traced Images"; docs/decisions/rays.md. The G-buffer replaces camera rays.
@@ -10,19 +10,16 @@ use super::classify::{Calls, RayTiles, classify_rays};
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
 use super::part::Part;
+use super::ray_trees::RayTrees;
 use crate::gpu::{Frame, Image};
-use crate::plan::{Architecture, Rays};
+use crate::plan::Rays;
 use crate::shader::interact;
-
-/// Pending rays beyond one per surface of a path: a surface may send four rays. Rays without a free slot are counted as
-/// truncated.
-const SPARE_BRANCHES: u32 = 4;
 
 /// Light samples of a primary surface for each of a surface that a ray meets (docs/decisions/light-samples.md).
 const FEWER_AT_HITS: u32 = 4;
 
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
-/// part is added: all rays are traced once more, over the same tiles.
+/// part is added: all rays are traced once more, over the same tiles. With `trees`, in steps.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.
@@ -31,7 +28,7 @@ pub fn interact<'a>(
     lighting: &Lighting<'a>,
     with: Rays,
     gbuffer: &'a GBuffer,
-    tiles: &'a RayTiles,
+    (tiles, trees): (&'a RayTiles, Option<&'a RayTrees>),
     radiance: &'a Image,
     part: Option<Part>,
 ) -> Result<()> {
@@ -48,13 +45,10 @@ pub fn interact<'a>(
     library.gbuffer.stored_triangles = true;
     // Many surfaces that rays meet share a pixel.
     library.emitters.light_samples = library.emitters.light_samples.div_ceil(FEWER_AT_HITS);
-    let constants = interact::Constants {
-        library,
-        masked_hits: with.masked,
-        pending: with.interfaces + SPARE_BRANCHES,
-        first_event: part.map_or(0, |part| part as u32),
-        branches_in_memory: lighting.plan.architecture == Architecture::Gpu,
-    };
+    library.ray_tree.first_event = part.map_or(0, |part| part as u32);
+    if let Some(trees) = trees {
+        return trees.grow(frame, &name, (lighting, library), gbuffer, tiles, radiance);
+    }
     let bind = interact::Bind {
         gbuffer: gbuffer.bind(),
         lighting: lighting.tiles.bind(),
@@ -62,5 +56,5 @@ pub fn interact<'a>(
         ray_tiles: &tiles.tiles,
         work: &tiles.sizes,
     };
-    frame.compute_indirect(&name, &bind, &constants, &(), tiles.groups())
+    frame.compute_indirect(&name, &bind, &interact::Constants { library }, &(), tiles.groups())
 }

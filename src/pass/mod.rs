@@ -20,6 +20,7 @@ pub mod path;
 pub mod path_pairs;
 pub mod path_states;
 pub mod path_steps;
+pub mod ray_trees;
 pub mod rows;
 pub mod screen;
 pub mod shadow_map;

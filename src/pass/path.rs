@@ -1,5 +1,5 @@
 //! Wavefront path tracing: the paths' states in memory, and the two forms in which bounces follow each other: pairs of
-//! paths in one kernel per bounce (path_pairs.rs), or three kernels per bounce with one path per invocation
+//! paths in one kernel per bounce (path_pairs.rs), or four kernels per bounce with one path per invocation
 //! (path_steps.rs).
 //!
 //! Read pbrt (4th ed.), chapter 15 (wavefront rendering) and sections 13.2 to 13.4; Laine, Karras and Aila 2013,
@@ -48,7 +48,7 @@ impl PathsOnDevice {
             states: PathStates::new(device, rays, touching, size, places)?,
             form: match plan.architecture {
                 Architecture::Cpu => Form::Pairs(PathPairs::new(device, places)?),
-                Architecture::Gpu => Form::Steps(PathSteps::new(device, rays, places, size)?),
+                Architecture::Gpu => Form::Steps(PathSteps::new(device, plan, places, size)?),
             },
         })
     }

@@ -1,5 +1,5 @@
-//! Path tracing on GPUs: each bounce is three dispatches with one path per invocation, which trace, shade, and trace
-//! shadow rays (shaders/pass/path_extend.comp, path_shade.comp, path_shadow.comp).
+//! Path tracing on GPUs: each bounce is four dispatches with one path per invocation, which trace, draw light samples,
+//! shade, and trace shadow rays (shaders/pass/path_extend.comp, path_sample.comp, path_shade.comp, path_shadow.comp).
 //!
 //! Read Laine, Karras and Aila 2013, "Megakernels Considered Harmful", and docs/decisions/architectures.md.
 
@@ -12,8 +12,8 @@ use super::lighting::Lighting;
 use super::path_states::{PathStates, words};
 use super::rows::rows_of;
 use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups, Place};
-use crate::plan::Rays;
-use crate::shader::{lib, path_end, path_extend, path_shade, path_shadow};
+use crate::plan::Plan;
+use crate::shader::{lib, path_end, path_extend, path_sample, path_shade, path_shadow};
 use crate::share::WorkSize;
 
 /// Queues of even and odd bounces in one buffer, the sizes of all bounces, hits and shadow rays.
@@ -27,7 +27,8 @@ pub struct PathSteps {
 
 impl PathSteps {
     /// Queues of up to `places` paths, in a picture of `size` pixels.
-    pub(super) fn new(device: &Arc<Device>, rays: Rays, places: u32, size: [u32; 2]) -> Result<Self> {
+    pub(super) fn new(device: &Arc<Device>, plan: &Plan, places: u32, size: [u32; 2]) -> Result<Self> {
+        let (rays, has_photons) = (plan.rays.unwrap_or_default(), plan.paths.is_some_and(|paths| paths.photons > 0));
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let [x, y, z] = rows_of(places.div_ceil(path_extend::PROGRAM.local_size[0]));
         let mut sizes = vec![WorkSize { x, y, z, count: places }];
@@ -40,8 +41,8 @@ impl PathSteps {
             hits: words(device, "hits of paths", true, 4 * pixels)?,
             shadow_rays: [
                 words(device, "directions of shadow rays", true, 4 * pixels)?,
-                words(device, "contributions of shadow rays", true, 3 * pixels)?,
-                words(device, "media of shadow rays", rays.transmissive, 4 * pixels)?,
+                words(device, "contributions of shadow rays", true, 4 * pixels)?,
+                words(device, "media of shadow rays", rays.transmissive || has_photons, 4 * pixels)?,
             ],
         })
     }
@@ -80,6 +81,19 @@ impl PathSteps {
                 path_extend::Push { width, places, bounce },
             );
             frame.compute_indirect("extend paths", &bind, &constants, &push, groups)?;
+            let has_shadow_rays = library.emitters.emitters > 0;
+            if has_shadow_rays || library.photon_map.photon_map {
+                let (bind, constants, push) = (
+                    path_sample::Bind {
+                        path_state: states.bind(),
+                        path_steps: path_steps(),
+                        path_shadow_ray: path_shadow_ray(),
+                    },
+                    path_sample::Constants { library },
+                    path_sample::Push { width, places, bounce },
+                );
+                frame.compute_indirect("sample lights", &bind, &constants, &push, groups)?;
+            }
             let (bind, constants, push) = (
                 path_shade::Bind {
                     path_state: states.bind(),
@@ -90,7 +104,7 @@ impl PathSteps {
                 path_shade::Push { width, places, bounce },
             );
             frame.compute_indirect("shade paths", &bind, &constants, &push, groups)?;
-            if library.emitters.emitters == 0 {
+            if !has_shadow_rays {
                 continue;
             }
             let (bind, constants, push) = (

@@ -11,9 +11,12 @@ use super::environment::EnvironmentOnDevice;
 use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource, Sampled};
-use crate::plan::{Attenuation, Knobs, March, Plan};
+use crate::plan::{Attenuation, Knobs, March, Plan, Rays};
 pub use crate::shader::Library;
 use crate::shader::{PATHS, SCENE, lib};
+
+/// Waiting branches of a ray tree beyond one for each surface of a path.
+const SPARE_BRANCHES: u32 = 4;
 
 /// The device resources of a scene.
 #[derive(Clone, Copy)]
@@ -182,6 +185,11 @@ impl<'a> OnDevice<'a> {
                     lib::sigma_grid::Constants { march_steps: steps, quadrature: rule as u32, march_colours: colours }
                 }
             },
+            ray_tree: lib::ray_tree::Constants {
+                masked_hits: with.masked,
+                pending: pending_branches(with),
+                first_event: 0,
+            },
             spectrum: lib::spectrum::Constants { spectral: spectrum.spectral, grid_side: spectrum.grid_side },
             surface: lib::surface::Constants {
                 brdf: knobs.brdf as u32,
@@ -197,6 +205,13 @@ impl<'a> OnDevice<'a> {
             trace: lib::trace::Constants { traversal: rays.constants.traversal, octants: rays.constants.octants },
         }
     }
+}
+
+/// Largest number of waiting branches of a ray tree: one for each surface of a path, and a few more, because a surface
+/// may send four rays. Rays without a free place are counted as truncated.
+#[must_use]
+pub fn pending_branches(rays: Rays) -> u32 {
+    rays.interfaces + SPARE_BRANCHES
 }
 
 /// Steps of a binary search among `count` entries.

@@ -589,6 +589,7 @@ impl PictureOptions {
             seed: self.seed,
             max_error: self.max_error,
             architecture: None,
+            ray_trees: None,
             traversal: None,
             forced: self.plan.forced(),
             parts: Vec::new(),
