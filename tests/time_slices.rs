@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use etalon::frame::Settings;
 use etalon::gpu::Interrupted;
 use etalon::plan::{Architecture, Knobs, Model};
+use etalon::scene::Scene;
 use etalon::scene::environment::Environment;
 use etalon::study;
 use etalon_testing::gpu::{Gpu, bits};
@@ -65,8 +66,20 @@ fn pieces_are_the_same_picture() {
 fn what_is_interrupted_goes_on() {
     let gpu = Gpu::time_sliced();
     let scene = study::load("etalon").expect("a scene");
-    let settings = Settings { size: [176, 99], knobs: Knobs::of(Model::Recursive), ..Settings::default() };
-    let mut renderer = gpu.renderer(&scene, None, settings);
+    for architecture in [Architecture::Cpu, Architecture::Gpu] {
+        go_on_after_interruptions(&gpu, &scene, architecture);
+    }
+}
+
+fn go_on_after_interruptions(gpu: &Gpu, scene: &Scene, architecture: Architecture) {
+    let settings = Settings {
+        size: [176, 99],
+        knobs: Knobs::of(Model::Recursive),
+        architecture: Some(architecture),
+        ray_trees: Some(256),
+        ..Settings::default()
+    };
+    let mut renderer = gpu.renderer(scene, None, settings);
     renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
     let whole = bits(&renderer.film().expect("a film"));
     let (device, mut interruptions) = (gpu.device.clone(), 0);

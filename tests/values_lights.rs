@@ -488,8 +488,9 @@ fn stretched_and_mirrored_balls_are_lit_as_ellipsoids() {
                     continue;
                 }
                 compared += 1;
-                // Where vertices are snapped to 1/256 of a pixel, a normal is that of a point up to half a step away, down
-                // and across. The cosine changes to the next pixel by this; a pixel without neighbours is an edge.
+                // Where vertices are snapped to 1/256 of a pixel, a normal is that of a point up to half a step away,
+                // down and across. The cosine changes to the next pixel by this; a pixel without neighbours is an
+                // edge.
                 let change = |step: usize| {
                     let next = [i.checked_sub(step), i.checked_add(step)].map(|i| i.filter(|&i| i < oracle.len()));
                     let changes = next.into_iter().flatten().filter_map(cosine).map(|other| (other - cos).abs());

@@ -197,9 +197,9 @@ struct HitSurface {
 
 #define TEXEL(page, slot) hit_texture_or(id, slot, point.uvs, footprint, vec4(1.0))
 
-// A triangle's normal on the side that a ray comes from.
-vec3 facing(vec3 n, vec3 direction) {
-    return dot(n, direction) <= 0.0 ? n : -n;
+// Whether a ray meets the front of a triangle of normal n.
+bool is_front(vec3 n, vec3 direction) {
+    return dot(n, direction) <= 0.0;
 }
 
 // The surface seen along `direction` by a ray (cone) of diameter `width` at the hit.
@@ -230,9 +230,9 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
         t.tangent = anisotropy_direction(n, point.t_smooth, textured ? anisotropy.rg * 2.0 - 1.0 : vec2(1.0, 0.0),
                                          lobe_factors(id, LOBE_ANISOTROPY).yz);
     }
-    r.front = dot(point.n, direction) <= 0.0;
+    r.front = is_front(point.n, direction);
     float side = r.front ? 1.0 : -1.0;
-    r.n = facing(point.n, direction);
+    r.n = side * point.n;
     r.coverage = coverage_of(m, t.base.a);
     r.sheet = point.sheet;
     r.material = id;

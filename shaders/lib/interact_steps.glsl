@@ -29,8 +29,8 @@ const uint TREE_SUM = 1;    // sum, escaped
 const uint TREE_AROUND = 2; // around, lost
 const uint TREE_HIT = 3;    // hit of the last branch of the stack
 const uint TREE_WORDS = 4;  // of four words each
-// Trees by what comes next: those of even and of odd steps that begin and that grow, then those of this step that met a
-// surface. At first every place of the queue has NO_TREE and begins the tree of its number.
+// Queues of trees by the kernel that takes them next: begin and extend, each for even and for odd steps; then those that
+// have met a surface in this step. At first all entries are NO_TREE: such an entry stands for the tree of its own place.
 layout(pass, scalar) buffer Queues { uint queues[]; };
 const uint BEGINNING = 0;
 const uint GROWING = 2;
@@ -42,6 +42,8 @@ const uint STEPS = 4;
 layout(pass, scalar) buffer Steps { uint pixels_taken; StepSizes steps[]; };
 layout(push_constant) uniform Push { uint trees_at_once; uint this_step; };
 
+// Rays of one tree. The branches that then wait are dropped and counted, as at the limit of loop iterations on CPUs.
+const uint MOST_RAYS = 1u << 16;
 // A tree that stands for a pixel without surface.
 const uint NO_PIXEL = 0xffffffffu;
 
@@ -133,10 +135,6 @@ void write_around() {
 Hit tree_hit() {
     uvec4 a = trees[tree_word(TREE_HIT)];
     return Hit(uintBitsToFloat(a.x), a.y, uintBitsToFloat(a.z), uintBitsToFloat(a.w));
-}
-
-ivec2 pixel_of_tree(uint packed) {
-    return ivec2(packed & 0xffffu, packed >> 16);
 }
 
 // The surface that the last branch has met.

@@ -77,7 +77,7 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
         if (leaf != NO_TRIANGLE) {
             HitPoint point = put_on_triangle(s, leaf, view_direction(camera, pixel));
             if (exact_normals) {
-                float side = dot(point.n, view_direction(camera, pixel)) <= 0.0 ? 1.0 : -1.0;
+                float side = is_front(point.n, view_direction(camera, pixel)) ? 1.0 : -1.0;
                 s.n_triangle = side * point.n;
                 vec3 smooth_n = side * point.n_smooth;
                 s.n = dot(n - smooth_n, n - smooth_n) < NORMAL_ERROR2 ? smooth_n : n;

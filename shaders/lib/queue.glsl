@@ -11,7 +11,7 @@
 const uint TERMINATED = 0x80000000u;
 
 // On GPUs: appends `entry` to a queue that begins at `first` of `queue`, and enlarges its dispatch `size`; every invocation of a
-// workgroup of 64 comes here. Three atomics per subgroup, in any order. `base` is 0 but in the invocation that added, so the
+// subgroup comes here. Three atomics per subgroup, in any order. `base` is 0 but in the invocation that added, so the
 // maximum passes it to all. Where to read: Vulkan specification, "Group Operations" (subgroups).
 #define APPEND_TO_QUEUE(size, queue, first, wanted, entry) \
     { \
@@ -20,7 +20,7 @@ const uint TERMINATED = 0x80000000u;
         uint base = 0; \
         if (subgroupElect() && appended > 0) { \
             base = atomicAdd(size.count, appended); \
-            uint groups = (base + appended + 63) / 64; \
+            uint groups = (base + appended + gl_WorkGroupSize.x - 1) / gl_WorkGroupSize.x; \
             atomicMax(size.x, min(groups, ROW)); \
             atomicMax(size.y, (groups + ROW - 1) / ROW); \
         } \

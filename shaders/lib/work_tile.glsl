@@ -16,11 +16,12 @@ const uint ROW = 32768; // workgroups along x; longer lists continue along y
     atomicMax(size.x, min(place + 1, ROW)); \
     atomicMax(size.y, place / ROW + 1)
 
-uint packed_tile(uvec2 first_pixel) {
-    return first_pixel.x | first_pixel.y << 16;
+// A pixel in one word; a tile is known by its first pixel.
+uint packed_pixel(uvec2 pixel) {
+    return pixel.x | pixel.y << 16;
 }
 
-ivec2 first_pixel(uint packed) {
+ivec2 unpacked_pixel(uint packed) {
     return ivec2(packed & 0xffffu, packed >> 16);
 }
 

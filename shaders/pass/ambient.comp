@@ -18,7 +18,7 @@ layout(pass, scalar) readonly buffer Sizes { WorkSize surface_size; WorkSize bac
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.surface_size.count) return;
-    ivec2 pixel = first_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixel = unpacked_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     LitSurface lit = lit_surface(pixel);
     if (!lit.drawn) return;

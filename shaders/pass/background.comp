@@ -15,7 +15,7 @@ layout(pass, scalar) readonly buffer Sizes { WorkSize surface_size; WorkSize bac
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.background_size.count) return;
-    ivec2 pixel = first_pixel(background_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixel = unpacked_pixel(background_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     if (stored_depth(pixel_index(pixel)) != 0.0) return;
     vec4 result = vec4(0.0);

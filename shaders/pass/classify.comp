@@ -29,7 +29,7 @@ void main() {
             farthest = min(farthest, z);
         }
     }
-    uint packed = packed_tile(first);
+    uint packed = packed_pixel(first);
     if (nearest > 0.0) {
         APPEND_TILE(surface_size, place);
         surface_tiles[place] = packed;

@@ -28,6 +28,6 @@ void main() {
     }
     if (any_fragment) {
         APPEND_TILE(tiles_size, place);
-        fragment_tiles[place] = packed_tile(first);
+        fragment_tiles[place] = packed_pixel(first);
     }
 }

@@ -35,6 +35,6 @@ void main() {
     }
     if (calls) {
         APPEND_TILE(rays_size, place);
-        ray_tiles[place] = packed_tile(first);
+        ray_tiles[place] = packed_pixel(first);
     }
 }

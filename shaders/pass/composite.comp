@@ -42,7 +42,7 @@ bool after(uvec3 a, uvec3 b) {
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.tiles_size.count) return;
-    ivec2 pixel = first_pixel(fragment_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixel = unpacked_pixel(fragment_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), uvec2(camera.size.x, end_row)))) return;
     uint head = imageLoad(heads, pixel).x;
     if (head == END_OF_LIST) return;

@@ -84,7 +84,7 @@ Branch next_branch() {
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.rays_size.count) return;
-    ivec2 pixel = first_pixel(ray_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixel = unpacked_pixel(ray_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     // 1. The primary surface, from the G-buffer, and its branches.
     Primary primary = primary_surface(pixel, true);

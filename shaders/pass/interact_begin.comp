@@ -23,7 +23,7 @@ void main() {
     if (complete != NO_PIXEL) {
         read_sum();
         read_around();
-        ivec2 pixel = pixel_of_tree(complete);
+        ivec2 pixel = unpacked_pixel(complete);
         vec4 before = imageLoad(radiance, pixel);
         imageStore(radiance, pixel, vec4(before.rgb + (sum + around), before.a * (1.0 - min(escaped, 1.0))));
         lost_by_tree = lost;
@@ -42,7 +42,7 @@ void main() {
     lost = 0.0;
     if (begins) {
         ivec2 within = ivec2(next % WORK_TILE, next % in_tile / WORK_TILE);
-        ivec2 pixel = first_pixel(ray_tiles[next / in_tile]) + within;
+        ivec2 pixel = unpacked_pixel(ray_tiles[next / in_tile]) + within;
         bool drawn = all(lessThan(uvec2(pixel), camera.size));
         if (drawn) {
             // 3. Its primary surface, and the first branches.
@@ -55,7 +55,7 @@ void main() {
                 split(hit, boundary, ray, cone_at_primary(hit), uvec2(pixel), 0);
             }
         }
-        trees[tree_word(TREE_PIXEL)] = uvec4(drawn ? packed_tile(uvec2(pixel)) : NO_PIXEL, waiting, 0u, 0u);
+        trees[tree_word(TREE_PIXEL)] = uvec4(drawn ? packed_pixel(uvec2(pixel)) : NO_PIXEL, waiting, 0u, 0u);
         write_sum();
         write_around();
     }

@@ -18,8 +18,10 @@ void main() {
         waiting = known.y;
         Branch ray = last_branch();
         by_reflection = is_reflected(ray);
+        // A pair of surfaces could pass a ray to each other for ever.
+        bool is_last = known.z >= MOST_RAYS;
         HitPoint point;
-        Hit found = trace_branch(ray, true, point);
+        Hit found = trace_branch(ray, !is_last, point);
         at_surface = found.triangle != NO_TRIANGLE;
         ray.throughput = throughput_after(ray, at_surface ? found.t : 0.0);
         if (at_surface) {
@@ -30,10 +32,14 @@ void main() {
         } else {
             read_sum();
             read_around();
-            leave_scene(ray);
+            if (is_last) {
+                for (; waiting > 0; waiting--) lost += largest(last_branch().throughput);
+            } else {
+                leave_scene(ray);
+                waiting--;
+            }
             write_sum();
             write_around();
-            waiting--;
         }
         trees[tree_word(TREE_PIXEL)] = uvec4(known.x, waiting, known.z + 1u, 0u);
     }

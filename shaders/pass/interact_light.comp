@@ -20,7 +20,7 @@ void main() {
         if (!boundary.suppressed_by_priority) {
             Surface s = surface_for_lights(hit, boundary, found.triangle);
             vec3 weight = wanted(ray.events, ray.throughput * hit.coverage);
-            vec3 light = radiance_to_eye(s, pixel_of_tree(known.x), known.z, 0, all_lights(), true);
+            vec3 light = radiance_to_eye(s, unpacked_pixel(known.x), known.z, 0, all_lights(), true);
             read_sum();
             sum += weight * light;
             write_sum();

@@ -22,7 +22,7 @@ void main() {
         Boundary boundary = boundary_at(hit, ray.media, ray.direction);
         waiting--;
         read_around();
-        split(hit, boundary, ray, cone, uvec2(pixel_of_tree(known.x)), known.z);
+        split(hit, boundary, ray, cone, uvec2(unpacked_pixel(known.x)), known.z);
         write_around();
         trees[tree_word(TREE_PIXEL)].y = waiting;
     }

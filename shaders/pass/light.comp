@@ -1,5 +1,5 @@
 // Deferred lighting: the radiance of each pixel's nearest surface, over the tiles with surfaces (tile classification).
-// Light along reflected and refracted rays is added by interact.comp. Where to read: RTR 4, section 20.1. Assumes: world
+// Light along reflected and refracted rays is added by another pass (lib/ray_tree.glsl). Where to read: RTR 4, section 20.1. Assumes: world
 // axes, positions relative to the eye.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -20,7 +20,7 @@ layout(push_constant, scalar) uniform Push { LightRange range; uint first_dispat
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.surface_size.count) return;
-    ivec2 pixel = first_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixel = unpacked_pixel(surface_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     LitSurface lit = lit_surface(pixel);
     if (!lit.drawn) return;

@@ -16,7 +16,7 @@ layout(pass, scalar) readonly buffer Sizes { WorkSize mirrors_size; } work;
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.mirrors_size.count) return;
-    ivec2 pixel = first_pixel(mirror_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixel = unpacked_pixel(mirror_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     Primary primary = primary_surface(pixel, false);
     if (!primary.drawn) return;

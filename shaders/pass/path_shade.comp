@@ -8,9 +8,9 @@
 layout(local_size_x = 64) in;
 #include "lib/path_shadow_ray.glsl"
 
-// By path_sample.comp.
-uint entry;
+uint entry; // of the queue
 
+// What path_sample.comp has stored. Where the path met nothing, that is of an earlier vertex, and shade_vertex makes no use of it.
 float emission_weight(Path p, Hit found, vec3 n) {
     return uintBitsToFloat(origins[entry].w);
 }

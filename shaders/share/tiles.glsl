@@ -20,7 +20,7 @@ struct QueueSize {
 
 // Sizes of the dispatches of one step of reflection and refraction, one ray tree per invocation.
 struct StepSizes {
-    WorkSize beginning; // trees of the pixels that are next
+    WorkSize beginning; // complete trees, which take the next pixels
     WorkSize growing;   // trees that follow a branch
     WorkSize met;       // trees whose branch has met a surface
 };

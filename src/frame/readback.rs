@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use anyhow::{Result, bail};
 use ash::vk;
+use rayon::prelude::*;
 
 use super::settings::{Settings, display_background};
 use super::targets::Targets;
@@ -121,7 +122,8 @@ impl Renderer {
         frame.download("read film", film, &target);
         frame.read_back(&target);
         frame.finish()?;
-        let rgba = target.read(|all| bytemuck::pod_collect_to_vec(&all[..bytes as usize]));
+        let texels = |all: &[u8]| bytemuck::cast_slice(&all[..bytes as usize]).par_iter().copied().collect();
+        let rgba = target.read(texels);
         Ok(Picture { width, height, rgba })
     }
 

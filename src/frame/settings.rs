@@ -94,8 +94,8 @@ pub struct Settings {
     pub traversal: Option<Traversal>,
     /// Architecture of the passes; `None` selects the one that suits the device.
     pub architecture: Option<Architecture>,
-    /// Ray trees that grow at the same time, at least 64, in the form of reflection and refraction for GPUs; `None`: as many as
-    /// a share of the device's memory holds.
+    /// Most ray trees that grow at the same time in the form of reflection and refraction for GPUs, in steps of 64;
+    /// `None`: as many as a share of the device's memory holds.
     pub ray_trees: Option<u32>,
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,

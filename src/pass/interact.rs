@@ -1,5 +1,5 @@
-//! Recursive ray tracing of reflection and refraction, over the tiles whose surfaces send rays: one kernel that follows a
-//! pixel's whole ray tree (shaders/pass/interact.comp), or trees that grow in steps (ray_trees.rs).
+//! Recursive ray tracing of reflection and refraction, over the tiles whose surfaces send rays: one kernel that
+//! follows a pixel's whole ray tree (shaders/pass/interact.comp), or trees that grow in steps (ray_trees.rs).
 //!
 //! Read Whitted 1980, "An Improved Illumination Model for Shaded Display"; Schmidt and Budge 2002, "Simple Nested
 //! Dielectrics in Ray Traced Images"; docs/decisions/rays.md. The G-buffer replaces camera rays.

@@ -21,10 +21,10 @@ use crate::shader::{Library, interact_begin, interact_extend, interact_light, in
 use crate::share::{StepSizes, WorkSize};
 use crate::upload::shared::pending_branches;
 
-/// Invocations of a workgroup.
-const GROUP: u32 = 64;
-/// Memory for the trees that grow at the same time: this share of the device's own, and at most so much. More trees need
-/// fewer steps, and a dispatch waits less for its longest ray (docs/decisions/architectures.md).
+/// Invocations of a workgroup, in all kernels of a step.
+const GROUP: u32 = interact_begin::PROGRAM.local_size[0];
+/// Memory for the trees that grow at the same time: this share of the device's own, and at most so much. More trees
+/// need fewer steps, and a dispatch waits less for its longest ray (docs/decisions/architectures.md).
 const SHARE_OF_MEMORY: u64 = 32;
 const MOST_BYTES: u64 = 1 << 30;
 /// The counter of pixels before the sizes.
@@ -43,7 +43,8 @@ pub struct RayTrees {
 }
 
 impl RayTrees {
-    /// Trees for a picture of `size` pixels, at most `most` at a time; `None` where the plan has another form of the pass, or none.
+    /// Trees for a picture of `size` pixels, at most `most` at a time; `None` where the plan has another form of the
+    /// pass, or none.
     ///
     /// # Errors
     /// When memory is short.

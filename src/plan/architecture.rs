@@ -12,9 +12,9 @@ pub enum Architecture {
     /// instead of branches, no stack in traversal.
     #[default]
     Cpu,
-    /// Thousands of invocations that share registers and caches: one path per invocation, kernels for rays and kernels
-    /// for surfaces, traversal with branches and a short stack in shared memory, neighbouring tiles in neighbouring
-    /// workgroups.
+    /// Thousands of invocations that share registers and caches: one path or ray tree per invocation, kernels for rays
+    /// and kernels for surfaces, traversal with branches and a short stack in shared memory, neighbouring tiles in
+    /// neighbouring workgroups.
     Gpu,
 }
 

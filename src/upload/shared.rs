@@ -15,7 +15,7 @@ use crate::plan::{Attenuation, Knobs, March, Plan, Rays};
 pub use crate::shader::Library;
 use crate::shader::{PATHS, SCENE, lib};
 
-/// Waiting branches of a ray tree beyond one for each surface of a path.
+/// Waiting branches of a ray tree beyond one for each surface of a path: a surface may send four rays.
 const SPARE_BRANCHES: u32 = 4;
 
 /// The device resources of a scene.
@@ -207,8 +207,7 @@ impl<'a> OnDevice<'a> {
     }
 }
 
-/// Largest number of waiting branches of a ray tree: one for each surface of a path, and a few more, because a surface
-/// may send four rays. Rays without a free place are counted as truncated.
+/// Largest number of waiting branches of a ray tree. Rays without a free place are counted as truncated.
 #[must_use]
 pub fn pending_branches(rays: Rays) -> u32 {
     rays.interfaces + SPARE_BRANCHES

@@ -8,8 +8,8 @@ use ash::vk;
 /// A pass's kind of access to a buffer or an image. The barriers of a frame take their masks from here alone.
 ///
 /// Two files write barriers with masks of their own, because theirs lie outside a frame. `time_slices.rs` submits the
-/// parts of a pass one by one, and lets each wait for all before it. `present.rs` draws into swapchain images, which
-/// are no resources of a frame and end in the layout for showing.
+/// parts of a pass one by one, and lets each wait for all before it, as repeated dispatches do. `present.rs` draws
+/// into swapchain images, which are no resources of a frame and end in the layout for showing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Access {
     /// Colour attachment, written (and cleared or blended over).

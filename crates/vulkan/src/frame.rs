@@ -320,6 +320,7 @@ impl<'a> Frame<'a> {
             all.pipelines.extend(pass.pipelines);
             body.push(dispatch);
         }
+        assert!(!body.is_empty(), "{name} repeats nothing");
         for groups in left {
             self.use_buffer(&mut all.uses, groups.sizes, Access::TransferSrc, vk::ShaderStageFlags::empty());
         }

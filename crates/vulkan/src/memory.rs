@@ -23,8 +23,8 @@ pub enum Place {
     Upload,
     /// Host-visible memory that the device writes and the host reads.
     Readback,
-    /// Device-local memory that shaders add to, and a copy that the host reads ([`Frame::read_back`](crate::Frame::read_back)):
-    /// additions across the bus of a GPU are slow.
+    /// Device-local memory that shaders add to, and a copy that the host reads
+    /// ([`Frame::read_back`](crate::Frame::read_back)): additions across the bus of a GPU are slow.
     Counters,
 }
 
@@ -138,7 +138,9 @@ impl Buffer {
             usage |= vk::BufferUsageFlags::STORAGE_TEXEL_BUFFER;
         }
         let host_copy = match place {
-            Place::Counters => Some(Box::new(Self::new(device, name, bytes, Place::Readback)?)),
+            Place::Counters => {
+                Some(Box::new(Self::new(device, &format!("{name} for the host"), bytes, Place::Readback)?))
+            }
             Place::Device | Place::Upload | Place::Readback => None,
         };
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);

@@ -20,8 +20,8 @@ pub(super) const OF_FRAME: &str = "of one frame";
 pub(super) struct SliceTimes {
     /// Whether a window shares the queue.
     pub(super) beside_window: bool,
-    /// Target duration of a submission in milliseconds; `None` where a frame is one submission: on a software device
-    /// without a window, which no operating system resets.
+    /// Target duration of a submission in milliseconds; `None` where a frame is one submission, but for repeated
+    /// dispatches: on a software device without a window, which no operating system resets.
     pub(super) slice_ms: Option<f64>,
     /// What passes took, by name.
     pub(super) paces: Mutex<HashMap<String, PassPace>>,
@@ -41,8 +41,30 @@ pub(super) struct PassPace {
     pub(super) per_group_ms: f64,
     /// Milliseconds of each occurrence in the last frame that had it.
     pub(super) last_ms: Vec<f64>,
-    /// Of repeated dispatches: milliseconds of each when it was submitted alone, and how often all were repeated last.
-    pub(super) repeated: (Vec<f64>, usize),
+    /// Of repeated dispatches.
+    pub(super) repeated: RepeatedPace,
+}
+
+/// What repeated dispatches of one name took.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RepeatedPace {
+    /// Milliseconds per workgroup of each; `None` before it had any.
+    pub(super) per_group_ms: Vec<Option<f64>>,
+    /// How often they were repeated in the last frame.
+    pub(super) often: usize,
+}
+
+impl RepeatedPace {
+    /// Sets the milliseconds per workgroup of dispatch `i`.
+    pub(super) fn set(&mut self, i: usize, ms: f64) {
+        self.per_group_ms.resize(self.per_group_ms.len().max(i + 1), None);
+        self.per_group_ms[i] = Some(ms);
+    }
+
+    /// Makes all slower by a factor: together they took longer than was possible.
+    pub(super) fn slow_down(&mut self, factor: f64) {
+        self.per_group_ms.iter_mut().flatten().for_each(|ms| *ms *= factor);
+    }
 }
 
 impl SliceTimes {

@@ -7,12 +7,13 @@
 //! can have. A pass that is unknown or longer is submitted and waited for by itself; a long dispatch in pieces of
 //! workgroups: each piece has as many groups as would take a slice at the measured time per group of the piece before.
 //! The host must know the number of groups of such a dispatch, so the arguments of an indirect one are read back first.
+//! Dispatches that the host repeats ([`super::Frame::repeat`]) are submissions of their own on every device.
 
 use std::collections::HashMap;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use ash::vk;
 
 use super::device::{Device, lock};
@@ -122,29 +123,32 @@ impl PassEstimate {
     }
 }
 
-/// How many of a body's `all` repeated dispatches are submitted together from the `at`th on: one while its time is not known,
-/// 0 where one alone is longer than a slice, otherwise as many whole bodies as are probably left and fit a slice. `paces`
-/// are the dispatches' times, and `often` is how often the body was repeated last.
-fn together(paces: &[f64], all: usize, at: usize, often: usize, slice_ms: f64) -> usize {
-    let (next, done) = (at % all, at / all);
-    if paces.len() < all {
-        return 1;
-    }
-    if paces[next] > slice_ms {
-        return 0;
-    }
+/// Milliseconds of repeated dispatches, once each, if every one has the most workgroups; `None` where that is not
+/// known or where one takes longer than a slice. A dispatch whose groups the host counts is one of few groups.
+fn longest_ms(body: &[Dispatch<'_>], per_group_ms: &[Option<f64>], slice_ms: f64) -> Option<f64> {
     let mut sum = 0.0;
-    let fit = paces[next..].iter().take_while(|ms| {
-        sum += **ms;
-        sum <= slice_ms
-    });
-    let fit = fit.count();
-    if fit < all - next {
-        return fit;
+    for (i, dispatch) in body.iter().enumerate() {
+        if let Groups::Indirect(groups) = dispatch.groups {
+            let ms = per_group_ms.get(i).copied().flatten()? * groups.most as f64;
+            if ms > slice_ms {
+                return None;
+            }
+            sum += ms;
+        }
     }
-    let left = if often > done { often - done } else { done.div_ceil(4).max(1) };
-    let more = ((slice_ms - sum) / paces.iter().sum::<f64>().max(1e-3)) as usize;
-    fit + more.min(left - 1) * all
+    Some(sum)
+}
+
+/// How often repeated dispatches are recorded into one submission. `slice`: milliseconds that it may take, and of the
+/// dispatches if each has the most workgroups; `None` where no submission is too long. `last`: how often they were in
+/// the submission before, and milliseconds of one time. `left`: how often they are still needed if it is as in the
+/// frame before.
+fn together(slice: Option<(f64, f64)>, last: Option<(usize, f64)>, left: usize) -> usize {
+    let guess = if left > 0 { left } else { last.map_or(1, |(count, _)| 2 * count) };
+    let Some((slice_ms, longest_ms)) = slice else { return guess };
+    let grown = last.map_or(f64::INFINITY, |(count, _)| GROWTH * count as f64);
+    let fit = slice_ms / last.map_or(longest_ms, |(_, ms)| ms.min(longest_ms)).max(1e-3);
+    guess.min(fit.min(grown).min(LONGEST_MS / longest_ms.max(1e-3)) as usize).max(1)
 }
 
 /// Time of a submission in milliseconds.
@@ -164,6 +168,8 @@ impl Took {
 
 /// The counts of an indirect dispatch, copied beside the passes of a batch: three words each.
 const GROUPS_BYTES: u64 = 12;
+/// Where those of [`Repeat::left`] are copied, when no batch is open.
+const LEFT_AT: [u64; 2] = [0, GROUPS_BYTES];
 
 impl Recording<'_> {
     /// Draws passes one after the other, in submissions of about a slice; milliseconds of each pass.
@@ -182,7 +188,8 @@ impl Recording<'_> {
 
     unsafe fn draw_all(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>], drawn: &mut Drawn) -> Result<()> {
         let slice_ms = self.device.time_slices.slice_ms.unwrap_or(LONGEST_MS);
-        let room = Buffer::new(self.device, OF_FRAME, GROUPS_BYTES * passes.len().max(2) as u64, Place::Readback)?;
+        let room =
+            Buffer::new(self.device, OF_FRAME, GROUPS_BYTES * passes.len().max(LEFT_AT.len()) as u64, Place::Readback)?;
         let mut seen: HashMap<String, usize> = HashMap::new();
         let mut batch: Option<Batch> = None;
         for (index, (pass, barriers)) in passes.into_iter().zip(barriers).enumerate() {
@@ -191,8 +198,13 @@ impl Recording<'_> {
             *occurrence += 1;
             drawn.names.push((pass.name.clone(), *occurrence - 1));
             drawn.groups.push(None);
-            // Without timestamps only a pass by itself has a time.
-            let whole = expected.filter(|expected| self.queries != vk::QueryPool::null() && expected.fits(slice_ms));
+            let whole = match (&pass.work, self.device.time_slices.slice_ms) {
+                (RecordedWork::Repeat(_), _) => None,
+                // Validation finds hazards only within one command buffer: all that can be is in one.
+                (_, None) => Some(PassEstimate::default()),
+                // Without timestamps only a pass by itself has a time.
+                (_, Some(_)) => expected.filter(|it| self.queries != vk::QueryPool::null() && it.fits(slice_ms)),
+            };
             // SAFETY: the caller guarantees both conditions; a batch is submitted before this function returns, or
             // freed.
             unsafe {
@@ -249,10 +261,12 @@ impl Recording<'_> {
         // SAFETY: the command buffer is recording; the caller of `in_turns` keeps all handles alive.
         unsafe {
             self.device.raw.cmd_reset_query_pool(commands, self.queries, query, 2);
-            record_barriers(self.device, commands, barriers, self.targets, false);
+            record_barriers(self.device, commands, barriers, self.targets, self.without_barriers);
             if let RecordedWork::Dispatch(Dispatch { groups, .. }) = &pass.work {
                 drawn.groups[index] = match groups {
                     Groups::Count(groups) => Some(Known::Now(groups.iter().map(|&n| u64::from(n)).product())),
+                    // The barriers of the copy would hide missing ones from validation.
+                    Groups::Indirect(_) if self.device.time_slices.slice_ms.is_none() => None,
                     Groups::Indirect(groups) => {
                         self.copy_groups(commands, *groups, room, GROUPS_BYTES * index as u64);
                         Some(Known::InRoom)
@@ -340,11 +354,6 @@ impl Recording<'_> {
                 RecordedWork::Repeat(work) => return self.repeated(&pass.name, &work, &made, room, first),
                 RecordedWork::Dispatch(work) => work,
             };
-            // Pipelines of devices that nothing resets take whole dispatches alone.
-            if self.device.time_slices.slice_ms.is_none() {
-                let record = |commands| work.record(self.device, commands, made[0], None);
-                return Ok(self.turn(&pass.name, first, record)?.ms);
-            }
             let known = lock(&self.device.time_slices.paces).get(&pass.name).map(|pace| pace.per_group_ms);
             let groups = match work.groups {
                 Groups::Count(groups) => groups,
@@ -355,8 +364,9 @@ impl Recording<'_> {
         }
     }
 
-    /// Submits repeated dispatches, as many together as take about a slice, until there is no more work; their GPU time in
-    /// milliseconds.
+    /// Submits repeated dispatches until there is no more work for them; their GPU time in milliseconds. As long as
+    /// the time per group of one is unknown, or one is longer than a slice, each is submitted by itself, in pieces;
+    /// otherwise all together, as often as fits a slice.
     unsafe fn repeated(
         &self,
         name: &str,
@@ -366,62 +376,78 @@ impl Recording<'_> {
         first: impl Fn(vk::CommandBuffer),
     ) -> Result<f64> {
         let Repeat { body, left } = work;
-        let slice_ms = self.device.time_slices.slice_ms.unwrap_or(f64::INFINITY);
-        let known = lock(&self.device.time_slices.paces).get(name).map(|pace| pace.repeated.clone());
-        let (mut paces, often) = known.unwrap_or_default();
+        let slices = &self.device.time_slices;
         let is_left = |commands| {
-            for (groups, place) in left.iter().zip([0, GROUPS_BYTES]) {
+            for (groups, place) in left.iter().zip(LEFT_AT) {
                 // SAFETY: the caller of `in_turns` keeps all handles alive.
                 unsafe { self.copy_groups(commands, *groups, room, place) };
             }
             // SAFETY: the command buffer is recording.
             unsafe { to_host(self.device, commands) };
         };
-        let (mut at, mut total) = (0, 0.0);
+        let often = lock(&slices.paces).get(name).map_or(0, |pace| pace.repeated.often);
+        let (mut begun, mut total, mut last, mut done) = (false, 0.0, None, 0);
         loop {
-            let next = at % body.len();
-            let before = |commands| match at {
-                0 => first(commands),
+            let before = |commands, begun: bool| match begun {
+                false => first(commands),
                 // SAFETY: the command buffer is recording.
-                _ => unsafe { after_all(self.device, commands) },
+                true => unsafe { after_all(self.device, commands) },
             };
-            let count = together(&paces, body.len(), at, often, slice_ms);
-            if count == 0 {
-                let Groups::Indirect(groups) = body[next].groups else {
-                    bail!("{name} has a dispatch that takes too long")
-                };
-                // SAFETY: the caller of `in_turns` keeps all handles alive.
-                unsafe {
-                    let groups = self.read_groups(groups, room)?;
-                    total += self.pieces(name, &body[next], pipelines[next], groups, None, before)?;
-                    self.turn(name, |_| (), is_left)?;
+            let paces =
+                lock(&slices.paces).get(name).map(|pace| pace.repeated.per_group_ms.clone()).unwrap_or_default();
+            let bound = slices.slice_ms.map(|slice_ms| (slice_ms, longest_ms(body, &paces, slice_ms)));
+            if let Some((_, None)) = bound {
+                for (i, dispatch) in body.iter().enumerate() {
+                    let groups = match dispatch.groups {
+                        Groups::Count(groups) => groups,
+                        // SAFETY: as above. Only the first submission needs the barriers of the pass.
+                        Groups::Indirect(groups) => unsafe { self.read_groups(groups, room)? },
+                    };
+                    let pace = paces.get(i).copied().flatten();
+                    // SAFETY: as above.
+                    let ms = unsafe {
+                        self.pieces(name, dispatch, pipelines[i], groups, pace, |commands| before(commands, begun))?
+                    };
+                    begun = true;
+                    total += ms;
+                    let count: u64 = groups.into_iter().map(u64::from).product();
+                    if count > 0 {
+                        lock(&slices.paces).entry(name.to_owned()).or_default().repeated.set(i, ms / count as f64);
+                    }
                 }
+                // SAFETY: as above.
+                unsafe { self.turn(name, |_| (), is_left)? };
+                done += 1;
             } else {
+                let slice = bound.and_then(|(slice_ms, longest)| Some((slice_ms, longest?)));
+                let count = together(slice, last, often.saturating_sub(done));
                 let record = |commands| {
-                    for i in (at..at + count).map(|i| i % body.len()) {
+                    for (dispatch, pipeline) in (0..count).flat_map(|_| body.iter().zip(pipelines)) {
                         // SAFETY: as above.
                         unsafe {
-                            body[i].record(self.device, commands, pipelines[i], None);
+                            dispatch.record(self.device, commands, *pipeline, None);
                             between_dispatches(self.device, commands);
                         }
                     }
                     is_left(commands);
                 };
                 // SAFETY: as above.
-                let took = unsafe { self.turn(name, before, record)? };
+                let took = unsafe { self.turn(name, |commands| before(commands, begun), record)? };
+                begun = true;
                 total += took.ms;
-                if next == paces.len() {
-                    paces.push(took.believed_ms());
+                let ms = took.believed_ms() / count as f64;
+                if let Some((_, longest)) = slice.filter(|(_, longest)| ms > *longest) {
+                    lock(&slices.paces).entry(name.to_owned()).or_default().repeated.slow_down(ms / longest);
                 }
+                last = Some((count, ms));
+                done += count;
             }
-            at += count.max(1);
-            let groups: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[..2 * GROUPS_BYTES as usize]));
-            if at % body.len() == 0 && groups[0] == 0 && groups[3] == 0 {
-                break;
+            lock(&slices.paces).entry(name.to_owned()).or_default().repeated.often = done;
+            let any = |place: u64| room.read(|bytes| bytes[place as usize..][..4].iter().any(|byte| *byte > 0));
+            if !LEFT_AT.into_iter().any(any) {
+                return Ok(total);
             }
         }
-        lock(&self.device.time_slices.paces).entry(name.to_owned()).or_default().repeated = (paces, at / body.len());
-        Ok(total)
     }
 
     /// Submits a dispatch in pieces; its GPU time in milliseconds.
@@ -609,17 +635,16 @@ mod tests {
 
     #[test]
     fn repeated_dispatches_are_together_as_far_as_a_slice_goes() {
-        let body = [1.0, 4.0, 2.0, 3.0];
-        // At first one by one.
-        assert_eq!((0..4).map(|known| together(&body[..known], 4, known, 0, 100.0)).sum::<usize>(), 4);
-        // Then a quarter more each time, to the end of a body.
-        assert_eq!([4, 16, 40].map(|at| together(&body, 4, at, 0, 1e3)), [4, 4, 12]);
-        // What was needed before, if it fits.
-        assert_eq!([0, 4].map(|at| together(&body, 4, at, 7, 1e3)), [28, 24]);
-        assert_eq!(together(&body, 4, 0, 7, 35.0), 12);
-        // Less than a body, from within it, and none where one is too long.
-        assert_eq!([0, 2, 3].map(|at| together(&body, 4, at, 7, 7.0)), [3, 2, 1]);
-        assert_eq!([0, 1, 2].map(|at| together(&body, 4, at, 7, 3.5)), [1, 0, 1]);
+        // Where nothing limits them: as often as the frame before, then twice as often each time.
+        assert_eq!([7, 0].map(|left| together(None, None, left)), [7, 1]);
+        assert_eq!(together(None, Some((7, 1.0)), 0), 14);
+        // A slice of 10 ms. At first by what they take with the most workgroups, then by what they took.
+        assert_eq!(together(Some((10.0, 3.0)), None, 50), 3);
+        assert_eq!(together(Some((10.0, 3.0)), Some((3, 1.0)), 47), 10);
+        // At most four times as often, never longer than 200 ms with the most workgroups, and once at least.
+        assert_eq!(together(Some((10.0, 3.0)), Some((3, 0.1)), 47), 12);
+        assert_eq!(together(Some((100.0, 20.0)), Some((9, 1.0)), 47), 10);
+        assert_eq!(together(Some((10.0, 30.0)), None, 50), 1);
     }
 
     #[test]
