@@ -165,6 +165,7 @@ const HIERARCHY: &[&str] = &[
     "corners for rays",
     "leaf places",
     "work counts",
+    "work counts for the host",
     "[reset work counts]",
 ];
 /// The tiles in which something is mirrored or refracted.
@@ -179,8 +180,10 @@ const TILES: &[&str] = &[
 /// Buffers of the per-pixel fragment lists.
 const FRAGMENTS: &[&str] = &[
     "dropped fragments",
+    "dropped fragments for the host",
     "empty fragment work size",
     "fragment counters",
+    "fragment counters for the host",
     "fragment list heads",
     "fragment list nodes",
     "fragment tiles",
@@ -321,7 +324,15 @@ fn media_bring_their_code() {
 
 /// What ambient occlusion brings to a scene without lights and mirrors, with its environment.
 const OF_OCCLUSION: &[&[&str]] = &[
-    &["BVH nodes", "BVH triangles", "corners for rays", "leaf places", "[reset work counts]", "work counts"],
+    &[
+        "BVH nodes",
+        "BVH triangles",
+        "corners for rays",
+        "leaf places",
+        "[reset work counts]",
+        "work counts",
+        "work counts for the host",
+    ],
     &["G-buffer triangles"],
     &["environment", "background.sky", "directional reflectance"],
     &["[ambient occlusion]", "ambient", "sky directions"],

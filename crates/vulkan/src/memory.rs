@@ -139,7 +139,8 @@ impl Buffer {
         }
         let host_copy = match place {
             Place::Counters => {
-                Some(Box::new(Self::new(device, &format!("{name} for the host"), bytes, Place::Readback)?))
+                let name = if name == NOTHING { NOTHING.to_owned() } else { format!("{name} for the host") };
+                Some(Box::new(Self::new(device, &name, bytes, Place::Readback)?))
             }
             Place::Device | Place::Upload | Place::Readback => None,
         };
