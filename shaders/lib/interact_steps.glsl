@@ -1,10 +1,10 @@
 // Ray trees in steps: what the kernels of reflection and refraction on GPUs leave for each other in memory.
 // As many trees grow at the same time as there is memory for. In each step every tree follows one branch, the last one of
 // its stack, and a tree that is complete makes room for that of another pixel (path regeneration). So all invocations have
-// work until the last pixels. A step is four dispatches over queues of trees: interact_begin.comp writes the light of
-// complete trees and begins those of other pixels; interact_extend.comp traces the branches; interact_light.comp lights the
-// surfaces that they meet; interact_split.comp splits them there. No kernel needs the registers of two of these tasks. The
-// host repeats STEPS steps until no tree is left; interact_next.comp moves the queues' sizes from the last to the first.
+// work until the last pixels. A step is five dispatches over queues of trees: interact_begin.comp writes the light of
+// complete trees and begins those of other pixels; interact_extend.comp traces the branches; interact_sample.comp draws a
+// light sample at the surfaces that they meet; interact_light.comp lights these; interact_split.comp splits the branches
+// there. So most kernels trace, or search lights, or shade, and need the registers of one of these. The host repeats STEPS steps until no tree is left; interact_next.comp moves the queues' sizes from the last to the first.
 // The order within a queue varies from run to run. Each tree adds to its own pixel alone, in its own order, so the picture
 // does not.
 // Where to read: Laine, Karras and Aila, Megakernels Considered Harmful, HPG 2013; Novák, Havran and Dachsbacher, Path
@@ -28,7 +28,8 @@ const uint TREE_PIXEL = 0;  // pixel, waiting branches, rays so far
 const uint TREE_SUM = 1;    // sum, escaped
 const uint TREE_AROUND = 2; // around, lost
 const uint TREE_HIT = 3;    // hit of the last branch of the stack
-const uint TREE_WORDS = 4;  // of four words each
+const uint TREE_LIGHT = 4;  // first light sample there: to_light, t_max; arriving, pdf
+const uint TREE_WORDS = 6;  // of four words each
 // Queues of trees by the kernel that takes them next: begin and extend, each for even and for odd steps; then those that
 // have met a surface in this step. At first all entries are NO_TREE: such an entry stands for the tree of its own place.
 layout(pass, scalar) buffer Queues { uint queues[]; };
@@ -135,6 +136,17 @@ void write_around() {
 Hit tree_hit() {
     uvec4 a = trees[tree_word(TREE_HIT)];
     return Hit(uintBitsToFloat(a.x), a.y, uintBitsToFloat(a.z), uintBitsToFloat(a.w));
+}
+
+LightSample tree_light() {
+    uvec4 a = trees[tree_word(TREE_LIGHT)];
+    uvec4 b = trees[tree_word(TREE_LIGHT + 1)];
+    return LightSample(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w));
+}
+
+void write_light(LightSample light) {
+    trees[tree_word(TREE_LIGHT)] = uvec4(floatBitsToUint(light.to_light), floatBitsToUint(light.t_max));
+    trees[tree_word(TREE_LIGHT + 1)] = uvec4(floatBitsToUint(light.arriving), floatBitsToUint(light.pdf));
 }
 
 // The surface that the last branch has met.

@@ -35,13 +35,15 @@ layout(constant) const bool SCREEN_MIRRORS = false;
 const uint LIGHT_EVENT = 0x800u;
 const uint FIRST_FRAGMENT = 0x1000u;
 
-// A light sample by next event estimation: one of LIGHT_SAMPLES for each sample of a pixel. `to_light` begins where the
-// shadow ray does.
-LightSample light_sample(Surface s, uvec2 pixel, uint surface, uint i) {
-    vec3 origin = ray_origin(s.p_bvh, s.n_triangle, s.v);
+// A light sample by next event estimation: one of LIGHT_SAMPLES for each sample of a pixel. `to_light` begins at `origin`,
+// where the shadow ray does.
+LightSample light_sample(vec3 origin, uvec2 pixel, uint surface, uint i) {
     uvec2 words = random_words(pixel, LIGHT_EVENT + surface, trace_terms.seed, trace_terms.sample_index * LIGHT_SAMPLES + i);
     return sample_emitter(origin, choose_emitter(origin, words.x), words.y);
 }
+
+layout(constant) const bool SAMPLED_APART = false; // another kernel has drawn the first light sample
+LightSample drawn_apart = LightSample(vec3(0.0), -1.0, vec3(0.0), 0.0);
 
 // The layers without the lobes that find emissive surfaces themselves, by a ray or in the picture.
 Layers without_mirrors(Layers b, uint surface) {
@@ -64,7 +66,10 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     PunctualLight light = punctual_light_at(is_sample ? 0u : index, s.p_rel);
     if (LIGHT_SAMPLES > 0) {
         if (is_sample) {
-            LightSample drawn = light_sample(s, pixel, surface, index);
+            LightSample drawn = drawn_apart;
+            if (!SAMPLED_APART || (LIGHT_SAMPLES > 1 && index > 0)) {
+                drawn = light_sample(ray_origin(s.p_bvh, s.n_triangle, s.v), pixel, surface, index);
+            }
             // Samples without light are evaluated as well: with a selection here the plans of a scene and of everything
             // differed by roundings, in 153 pixels of study:etalon.
             light = PunctualLight(drawn.to_light, normalize(drawn.to_light), drawn.arriving / float(LIGHT_SAMPLES), false);

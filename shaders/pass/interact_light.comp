@@ -1,4 +1,4 @@
-// Reflection and refraction in steps, 3 of 4: lights the surface that the last branch of each ray tree has met.
+// Reflection and refraction in steps, 4 of 5: lights the surface that the last branch of each ray tree has met.
 // Where to read: lib/interact_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -19,6 +19,7 @@ void main() {
         Boundary boundary = boundary_at(hit, ray.media, ray.direction);
         if (!boundary.suppressed_by_priority) {
             Surface s = surface_for_lights(hit, boundary, found.triangle);
+            if (SAMPLED_APART) drawn_apart = tree_light();
             vec3 weight = wanted(ray.events, ray.throughput * hit.coverage);
             vec3 light = radiance_to_eye(s, unpacked_pixel(known.x), known.z, 0, all_lights(), true);
             read_sum();

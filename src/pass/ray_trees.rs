@@ -1,5 +1,5 @@
-//! Reflection and refraction on GPUs: ray trees that grow in steps of four dispatches, which begin, extend, light and
-//! split, repeated until all are complete (shaders/lib/interact_steps.glsl).
+//! Reflection and refraction on GPUs: ray trees that grow in steps of dispatches, which begin, extend, sample lights,
+//! light and split, repeated until all are complete (shaders/lib/interact_steps.glsl).
 //!
 //! Read Laine, Karras and Aila 2013, "Megakernels Considered Harmful"; Novák, Havran and Dachsbacher 2010, "Path
 //! Regeneration for Interactive Path Tracing"; docs/decisions/architectures.md.
@@ -17,7 +17,9 @@ use super::rows::rows_of;
 use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups};
 use crate::plan::{Architecture, Plan};
 use crate::shader::lib::interact_steps::{BRANCH_WORDS, NO_TREE, STEPS, TREE_QUEUES, TREE_WORDS};
-use crate::shader::{Library, interact_begin, interact_extend, interact_light, interact_next, interact_split, lib};
+use crate::shader::{
+    Library, interact_begin, interact_extend, interact_light, interact_next, interact_sample, interact_split, lib,
+};
 use crate::share::{StepSizes, WorkSize};
 use crate::upload::shared::pending_branches;
 
@@ -95,7 +97,7 @@ impl RayTrees {
         &'a self,
         frame: &mut Frame<'a>,
         name: &str,
-        (lighting, library): (&Lighting<'a>, Library),
+        (lighting, mut library): (&Lighting<'a>, Library),
         gbuffer: &'a GBuffer,
         tiles: &'a RayTiles,
         radiance: &'a Image,
@@ -104,6 +106,7 @@ impl RayTrees {
         frame.fill("reset ray trees", &self.queues, NO_TREE);
         let [beginning, growing, met] =
             [offset_of!(StepSizes, beginning), offset_of!(StepSizes, growing), offset_of!(StepSizes, met)];
+        library.lighting.sampled_apart = library.emitters.light_samples > 0;
         let left = [beginning, growing].map(|queue| self.groups(STEPS, queue));
         frame.repeat(name, left, |frame| {
             let bind = interact_next::Bind { interact_steps: self.bind() };
@@ -123,6 +126,11 @@ impl RayTrees {
                 let bind = interact_extend::Bind { interact_steps: self.bind() };
                 let push = interact_extend::Push { trees_at_once: self.count, this_step };
                 frame.compute_indirect(name, &bind, &interact_extend::Constants { library }, &push, growing)?;
+                if library.lighting.sampled_apart {
+                    let bind = interact_sample::Bind { interact_steps: self.bind() };
+                    let push = interact_sample::Push { trees_at_once: self.count, this_step };
+                    frame.compute_indirect(name, &bind, &interact_sample::Constants { library }, &push, met)?;
+                }
                 let bind = interact_light::Bind { interact_steps: self.bind(), lighting: lighting.tiles.bind() };
                 let push = interact_light::Push { trees_at_once: self.count, this_step };
                 frame.compute_indirect(name, &bind, &interact_light::Constants { library }, &push, met)?;

@@ -151,6 +151,7 @@ impl<'a> OnDevice<'a> {
                 tile_words,
                 light_budget: u32::MAX,
                 screen_mirrors: false,
+                sampled_apart: false,
             },
             loops: match scene.device().limits_loops() {
                 true => lib::loops::Constants::default(),

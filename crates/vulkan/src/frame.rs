@@ -289,8 +289,8 @@ impl<'a> Frame<'a> {
     }
 
     /// Dispatches that are repeated, in the order in which `record` adds them, until neither of `left` has a workgroup
-    /// after the last of them. Between any two of them all writes are visible. A frame with such a pass is several
-    /// submissions.
+    /// after the last of them; no dispatch may have more workgroups than both had together the time before. Between any
+    /// two of them all writes are visible. A frame with such a pass is several submissions.
     ///
     /// # Errors
     /// What `record` returns.

@@ -123,13 +123,14 @@ impl PassEstimate {
     }
 }
 
-/// Milliseconds of repeated dispatches, once each, if every one has the most workgroups; `None` where that is not
-/// known or where one takes longer than a slice. A dispatch whose groups the host counts is one of few groups.
-fn longest_ms(body: &[Dispatch<'_>], per_group_ms: &[Option<f64>], slice_ms: f64) -> Option<f64> {
+/// Milliseconds of repeated dispatches, once each, if every one has as many workgroups as it can have, at most
+/// `most`; `None` where that is not known or where one takes longer than a slice. A dispatch whose groups the host
+/// counts is one of few groups.
+fn longest_ms(body: &[Dispatch<'_>], per_group_ms: &[Option<f64>], most: u64, slice_ms: f64) -> Option<f64> {
     let mut sum = 0.0;
     for (i, dispatch) in body.iter().enumerate() {
         if let Groups::Indirect(groups) = dispatch.groups {
-            let ms = per_group_ms.get(i).copied().flatten()? * groups.most as f64;
+            let ms = per_group_ms.get(i).copied().flatten()? * groups.most.min(most) as f64;
             if ms > slice_ms {
                 return None;
             }
@@ -311,9 +312,7 @@ impl Recording<'_> {
         for (index, ms) in passes.into_iter().zip(times) {
             drawn.ms[index] = Some(ms + missing);
             if let Some(known @ Known::InRoom) = &mut drawn.groups[index] {
-                let at = GROUPS_BYTES as usize * index;
-                let words: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[at..at + 12]));
-                *known = Known::Now(words.into_iter().map(u64::from).product());
+                *known = Known::Now(read_product(room, GROUPS_BYTES * index as u64));
             }
         }
         Ok(())
@@ -387,6 +386,8 @@ impl Recording<'_> {
         };
         let often = lock(&slices.paces).get(name).map_or(0, |pace| pace.repeated.often);
         let (mut begun, mut total, mut last, mut done) = (false, 0.0, None, 0);
+        // Workgroups that are left: no dispatch has more.
+        let mut most = u64::MAX;
         loop {
             let before = |commands, begun: bool| match begun {
                 false => first(commands),
@@ -395,7 +396,7 @@ impl Recording<'_> {
             };
             let paces =
                 lock(&slices.paces).get(name).map(|pace| pace.repeated.per_group_ms.clone()).unwrap_or_default();
-            let bound = slices.slice_ms.map(|slice_ms| (slice_ms, longest_ms(body, &paces, slice_ms)));
+            let bound = slices.slice_ms.map(|slice_ms| (slice_ms, longest_ms(body, &paces, most, slice_ms)));
             if let Some((_, None)) = bound {
                 for (i, dispatch) in body.iter().enumerate() {
                     let groups = match dispatch.groups {
@@ -443,8 +444,8 @@ impl Recording<'_> {
                 done += count;
             }
             lock(&slices.paces).entry(name.to_owned()).or_default().repeated.often = done;
-            let any = |place: u64| room.read(|bytes| bytes[place as usize..][..4].iter().any(|byte| *byte > 0));
-            if !LEFT_AT.into_iter().any(any) {
+            most = LEFT_AT.into_iter().map(|place| read_product(room, place)).sum();
+            if most == 0 {
                 return Ok(total);
             }
         }
@@ -592,6 +593,13 @@ impl Drawn {
             paces.entry(name.to_owned()).or_default().per_group_ms = ms / groups as f64;
         }
     }
+}
+
+/// Number of workgroups that were copied to a place of `room`.
+fn read_product(room: &Buffer, place: u64) -> u64 {
+    let at = place as usize;
+    let words: Vec<u32> = room.read(|bytes| bytemuck::pod_collect_to_vec(&bytes[at..at + GROUPS_BYTES as usize]));
+    words.into_iter().map(u64::from).product()
 }
 
 /// Makes the writes of a dispatch available to the next one, and to the sizes of an indirect one.
