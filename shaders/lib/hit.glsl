@@ -202,6 +202,11 @@ bool is_front(vec3 n, vec3 direction) {
     return dot(n, direction) <= 0.0;
 }
 
+// The triangle's normal on the side that a ray comes from.
+vec3 facing_normal(HitPoint point, vec3 direction) {
+    return is_front(point.n, direction) ? point.n : -point.n;
+}
+
 // The surface seen along `direction` by a ray (cone) of diameter `width` at the hit.
 HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     HitSurface r;
@@ -232,7 +237,7 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     }
     r.front = is_front(point.n, direction);
     float side = r.front ? 1.0 : -1.0;
-    r.n = side * point.n;
+    r.n = facing_normal(point, direction);
     r.coverage = coverage_of(m, t.base.a);
     r.sheet = point.sheet;
     r.material = id;

@@ -16,7 +16,7 @@ void main() {
     Path p = path_without_sum(entry);
     Hit found = Hit(uintBitsToFloat(hit.x), hit.y, uintBitsToFloat(hit.z), uintBitsToFloat(hit.w));
     HitPoint point = hit_point_of(found, p.origin, p.direction);
-    vec3 n = is_front(point.n, p.direction) ? point.n : -point.n;
+    vec3 n = facing_normal(point, p.direction);
     if (EMITTERS > 0) store_light(draw_first_light(p, ray_origin(point.p, n, -p.direction), pixel_of(entry)), entry);
     // Whether the surface scatters is not known here. Where it does not, few photons are near.
     if (PHOTON_MAP) store_photon(draw_photon(p, point.p, n, pixel_of(entry), true), entry);

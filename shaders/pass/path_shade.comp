@@ -10,7 +10,8 @@ layout(local_size_x = 64) in;
 
 uint entry; // of the queue
 
-// What path_sample.comp has stored. Where the path met nothing, that is of an earlier vertex, and shade_vertex makes no use of it.
+// What path_sample.comp has stored. Where the path met nothing, that is of an earlier vertex, and shade_vertex makes no use
+// of it.
 float emission_weight(Path p, Hit found, vec3 n) {
     return uintBitsToFloat(origins[entry].w);
 }

@@ -296,7 +296,7 @@ impl<'a> Frame<'a> {
     /// What `record` returns.
     ///
     /// # Panics
-    /// When `record` adds anything but dispatches, a bug of the caller.
+    /// When `record` adds nothing, or anything but dispatches, a bug of the caller.
     pub fn repeat(
         &mut self,
         name: &str,
@@ -305,27 +305,21 @@ impl<'a> Frame<'a> {
     ) -> Result<()> {
         let before = self.passes.len();
         record(self)?;
-        let mut all = Pass {
-            name: name.to_owned(),
-            uses: Vec::new(),
-            pipelines: Vec::new(),
-            work: RecordedWork::Record(Box::new(|_, _, _| ())),
-        };
-        let mut body = Vec::new();
+        let (mut uses, mut pipelines, mut body) = (Vec::new(), Vec::new(), Vec::new());
         for pass in self.passes.drain(before..) {
             let RecordedWork::Dispatch(dispatch) = pass.work else {
                 panic!("{name} repeats {}, no dispatch", pass.name)
             };
-            all.uses.extend(pass.uses);
-            all.pipelines.extend(pass.pipelines);
+            uses.extend(pass.uses);
+            pipelines.extend(pass.pipelines);
             body.push(dispatch);
         }
         assert!(!body.is_empty(), "{name} repeats nothing");
         for groups in left {
-            self.use_buffer(&mut all.uses, groups.sizes, Access::TransferSrc, vk::ShaderStageFlags::empty());
+            self.use_buffer(&mut uses, groups.sizes, Access::TransferSrc, vk::ShaderStageFlags::empty());
         }
-        all.work = RecordedWork::Repeat(Repeat { body, left });
-        self.passes.push(all);
+        let work = RecordedWork::Repeat(Repeat { body, left });
+        self.passes.push(Pass { name: name.to_owned(), uses, pipelines, work });
         Ok(())
     }
 

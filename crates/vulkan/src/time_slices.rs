@@ -401,7 +401,7 @@ impl Recording<'_> {
                 for (i, dispatch) in body.iter().enumerate() {
                     let groups = match dispatch.groups {
                         Groups::Count(groups) => groups,
-                        // SAFETY: as above. Only the first submission needs the barriers of the pass.
+                        // SAFETY: as above.
                         Groups::Indirect(groups) => unsafe { self.read_groups(groups, room)? },
                     };
                     let pace = paces.get(i).copied().flatten();
