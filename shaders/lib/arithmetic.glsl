@@ -75,6 +75,21 @@ DoubleFloat two_sum(float a, float b) {
     return DoubleFloat(s, abs(s) <= LARGEST ? rest : 0.0);
 }
 
+// Three double-floats, for which compilers and validators see a third of the instructions.
+struct DoubleFloat3 {
+    vec3 hi;
+    vec3 lo;
+};
+
+// two_sum of each component.
+DoubleFloat3 two_sums(vec3 a, vec3 b) {
+    precise vec3 s = a + b;
+    precise vec3 b_in_s = s - a;
+    precise vec3 a_in_s = s - b_in_s;
+    precise vec3 rest = (a - a_in_s) + (b - b_in_s);
+    return DoubleFloat3(s, mix(vec3(0.0), rest, lessThanEqual(abs(s), vec3(LARGEST))));
+}
+
 // @eq N11 N25 N30: hi + lo = a + b exactly, for |a| ≥ |b| or a = 0
 // Dekker's fast two-sum: half the operations of Knuth's. If |a| < |b|, lo may lack the last bits.
 DoubleFloat quick_two_sum(float a, float b) {
@@ -89,6 +104,10 @@ float leading_half(float a) {
     return uintBitsToFloat(floatBitsToUint(a) & 0xfffff000u);
 }
 
+vec3 leading_halves(vec3 a) {
+    return uintBitsToFloat(floatBitsToUint(a) & 0xfffff000u);
+}
+
 // @eq N11 N25 N28: hi + lo = a·b exactly, hi = fl(a·b)
 // Dekker's product: halves of 12 bits have exact products, and each partial sum below fits into 24 bits. Where |a·b| <
 // 2^-102 the error is below the normal range and lo is rounded or 0.
@@ -100,6 +119,17 @@ DoubleFloat two_product(float a, float b) {
     precise float b_lo = b - b_hi;
     precise float rest = (((a_hi * b_hi - p) + a_hi * b_lo) + a_lo * b_hi) + a_lo * b_lo;
     return DoubleFloat(p, abs(p) <= LARGEST ? rest : 0.0);
+}
+
+// two_product of each component.
+DoubleFloat3 two_products(vec3 a, vec3 b) {
+    precise vec3 p = a * b;
+    precise vec3 a_hi = leading_halves(a);
+    precise vec3 a_lo = a - a_hi;
+    precise vec3 b_hi = leading_halves(b);
+    precise vec3 b_lo = b - b_hi;
+    precise vec3 rest = (((a_hi * b_hi - p) + a_hi * b_lo) + a_lo * b_hi) + a_lo * b_lo;
+    return DoubleFloat3(p, mix(vec3(0.0), rest, lessThanEqual(abs(p), vec3(LARGEST))));
 }
 
 // @eq N11: a + b, relative error 3·2^-48
@@ -154,32 +184,24 @@ DoubleFloat df_square_minus_one(float n) {
     return df_add(two_product(n, n), DoubleFloat(-1.0, 0.0));
 }
 
-// ab − cd, as if computed in twice the precision.
-float difference_of_products(float a, float b, float c, float d) {
-    DoubleFloat p = two_product(a, b);
-    DoubleFloat q = two_product(c, d);
-    DoubleFloat s = two_sum(p.hi, -q.hi);
-    precise float rest = s.lo + (p.lo - q.lo);
-    precise float sum = s.hi + rest;
-    return sum;
-}
-
 // a × b, each component as if computed in twice the precision.
 vec3 cross2(vec3 a, vec3 b) {
-    return vec3(difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
-                difference_of_products(a.x, b.y, a.y, b.x));
+    DoubleFloat3 p = two_products(a.yzx, b.zxy);
+    DoubleFloat3 q = two_products(a.zxy, b.yzx);
+    DoubleFloat3 s = two_sums(p.hi, -q.hi);
+    precise vec3 rest = s.lo + (p.lo - q.lo);
+    precise vec3 sum = s.hi + rest;
+    return sum;
 }
 
 // @eq N11 N25: a_x b_x + a_y b_y + a_z b_z as if in twice the precision
 // Ogita, Rump and Oishi: exact products and sums; their rounding errors are added in f32. Error 2^-46 of the sum of
 // magnitudes. Components stay below 1e19: the products overflow above.
 DoubleFloat dot2(vec3 a, vec3 b) {
-    DoubleFloat x = two_product(a.x, b.x);
-    DoubleFloat y = two_product(a.y, b.y);
-    DoubleFloat z = two_product(a.z, b.z);
-    DoubleFloat s = two_sum(x.hi, y.hi);
-    DoubleFloat t = two_sum(s.hi, z.hi);
-    precise float rest = ((x.lo + y.lo) + (s.lo + z.lo)) + t.lo;
+    DoubleFloat3 p = two_products(a, b);
+    DoubleFloat s = two_sum(p.hi.x, p.hi.y);
+    DoubleFloat t = two_sum(s.hi, p.hi.z);
+    precise float rest = ((p.lo.x + p.lo.y) + (s.lo + p.lo.z)) + t.lo;
     return two_sum(t.hi, rest);
 }
 

@@ -29,85 +29,92 @@ struct HalfAngle {
     float sum2;   // |L + V|²; 0 for L = −V, where H is undefined: then cos_h is 0 and sin2_h 1
 };
 
+// L + V without its component along L − V: the first two steps of half_angle, which all normals share.
+struct DirectionSum {
+    vec3 hi;
+    vec3 lo;           // 0 unless compensated
+    DoubleFloat sum2;  // its square
+    HalfAngle alone;   // what does not depend on a normal
+};
+
+DirectionSum sum_of_directions(vec3 L, vec3 V) {
+    DirectionSum r = DirectionSum(L + V, vec3(0.0), DoubleFloat(0.0, 0.0), HalfAngle(0.0, 1.0, 0.0, 0.0));
+    if (ARITHMETIC == FAST) {
+        vec3 H = normalize(r.hi);
+        r.alone.cos_d = dot(V, H);
+        r.alone.sum2 = 2.0 * (1.0 + dot(L, V));
+        r.hi = H;
+    } else if (ARITHMETIC == COMPENSATED) {
+        // 1. S and D as double-floats.
+        DoubleFloat3 S = two_sums(L, V);
+        DoubleFloat3 D = two_sums(L, -V);
+        // 2. Remove the component of S along D.
+        DoubleFloat l2 = dot2(L, L);
+        DoubleFloat v2 = dot2(V, V);
+        precise float length_error = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
+        // Divided by (|L| + |V|)², which is 2L² + 2V² to 1e-14: |L + V| may be as small as the correction itself.
+        DoubleFloat products = dot2(S.hi, D.hi);
+        precise float along_lo = products.lo + (dot(S.lo, D.hi) + dot(S.hi, D.lo));
+        DoubleFloat correction = df_div(quick_two_sum(products.hi, along_lo), df_scale(df_add(l2, v2), 2.0));
+        DoubleFloat3 turned = two_products(vec3(correction.hi), D.hi);
+        precise vec3 turned_lo = turned.lo + (correction.hi * D.lo + correction.lo * D.hi);
+        DoubleFloat3 T = two_sums(S.hi, -turned.hi);
+        precise vec3 T_lo = (S.lo + T.lo) - turned_lo;
+        DoubleFloat t2 = dot2(T.hi, T.hi);
+        precise float t2_lo = t2.lo + 2.0 * dot(T.hi, T_lo);
+        r.hi = T.hi;
+        r.lo = T_lo;
+        r.sum2 = quick_two_sum(t2.hi, t2_lo);
+        r.alone.sum2 = r.sum2.hi - r.sum2.hi * (0.5 * length_error);
+        r.alone.cos_d = min(0.5 * sqrt(r.alone.sum2), 1.0);
+    } else {
+        // The same steps in f32.
+        vec3 D = L - V;
+        vec3 S = r.hi - D * (0.25 * dot(r.hi, D));
+        float s2 = dot(S, S);
+        bool defined = s2 >= SMALLEST_NORMAL;
+        r.hi = defined ? S * inversesqrt(s2) : vec3(0.0);
+        r.sum2.hi = s2;
+        r.alone.cos_d = defined ? min(0.5 * sqrt(s2), 1.0) : 0.0;
+        r.alone.sum2 = defined ? s2 : 0.0;
+    }
+    return r;
+}
+
+// The third step of half_angle.
+HalfAngle half_angle_to(vec3 N, DirectionSum sum) {
+    HalfAngle r = sum.alone;
+    if (ARITHMETIC == COMPENSATED) {
+        DoubleFloat lengths = df_mul(sum.sum2, dot2(N, N));
+        bool defined = lengths.hi >= SMALLEST_NORMAL;
+        vec3 across = cross2(N, sum.hi) + cross(N, sum.lo);
+        DoubleFloat c = dot2(N, sum.hi);
+        precise float c_lo = c.lo + dot(N, sum.lo);
+        float cos_h = df_div(quick_two_sum(c.hi, c_lo), df_sqrt(lengths)).hi;
+        float sin2_h = df_div(dot2(across, across), lengths).hi;
+        if (defined) r = HalfAngle(cos_h, sin2_h, r.cos_d, r.sum2);
+        else r = HalfAngle(0.0, 1.0, 0.0, 0.0);
+    } else if (ARITHMETIC == FAST || sum.sum2.hi >= SMALLEST_NORMAL) {
+        r.cos_h = dot(N, sum.hi);
+        r.sin2_h = sine_squared(N, sum.hi);
+    }
+    return r;
+}
+
 // @eq B1 N9 N18 N19: H = (L + V)/|L + V|, cosθ_h = N·H, cosθ_d = V·H = |L + V|/2
 // Derivation. S = L + V, D = L − V.
 // 1. Where L is near −V, S is exact but short. If rounding makes |L| and |V| differ by 1e-7, S has a component along D.
 // 2. For unit vectors S ⟂ D. So the component of S along D is removed: S − (L² − V²)/4 · D, since S·D = L² − V² and D² = 4.
 // 3. cosθ_h, sin²θ_h and cosθ_d follow from the corrected S. 2(1 + L·V) would lose |L + V|² altogether (numerics.md 18).
 // Compensated: S and D are double-floats, and N × S and N·S are sums of exact products.
+// @lab half_angle_to: laboratory_forms_agree_with_the_functions_of_pictures
 HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
-    HalfAngle r = HalfAngle(0.0, 1.0, 0.0, 0.0);
-    if (ARITHMETIC == FAST) {
-        vec3 H = normalize(L + V);
-        r.cos_h = dot(N, H);
-        r.sin2_h = sine_squared(N, H);
-        r.cos_d = dot(V, H);
-        r.sum2 = 2.0 * (1.0 + dot(L, V));
-    } else if (ARITHMETIC == COMPENSATED) {
-        // 1. S and D as double-floats.
-        DoubleFloat sx = two_sum(L.x, V.x);
-        DoubleFloat sy = two_sum(L.y, V.y);
-        DoubleFloat sz = two_sum(L.z, V.z);
-        DoubleFloat dx = two_sum(L.x, -V.x);
-        DoubleFloat dy = two_sum(L.y, -V.y);
-        DoubleFloat dz = two_sum(L.z, -V.z);
-        vec3 S = vec3(sx.hi, sy.hi, sz.hi);
-        vec3 S_lo = vec3(sx.lo, sy.lo, sz.lo);
-        vec3 D = vec3(dx.hi, dy.hi, dz.hi);
-        vec3 D_lo = vec3(dx.lo, dy.lo, dz.lo);
-        // 2. Remove the component of S along D.
-        DoubleFloat l2 = dot2(L, L);
-        DoubleFloat v2 = dot2(V, V);
-        precise float length_error = ((l2.hi - 1.0) + l2.lo) + ((v2.hi - 1.0) + v2.lo);
-        // Divided by (|L| + |V|)², which is 2L² + 2V² to 1e-14: |L + V| may be as small as the correction itself.
-        DoubleFloat products = dot2(S, D);
-        precise float along_lo = products.lo + (dot(S_lo, D) + dot(S, D_lo));
-        DoubleFloat correction = df_div(quick_two_sum(products.hi, along_lo), df_scale(df_add(l2, v2), 2.0));
-        DoubleFloat px = two_product(correction.hi, D.x);
-        DoubleFloat py = two_product(correction.hi, D.y);
-        DoubleFloat pz = two_product(correction.hi, D.z);
-        precise vec3 turned_lo = vec3(px.lo, py.lo, pz.lo) + (correction.hi * D_lo + correction.lo * D);
-        DoubleFloat tx = two_sum(S.x, -px.hi);
-        DoubleFloat ty = two_sum(S.y, -py.hi);
-        DoubleFloat tz = two_sum(S.z, -pz.hi);
-        vec3 T = vec3(tx.hi, ty.hi, tz.hi);
-        precise vec3 T_lo = (S_lo + vec3(tx.lo, ty.lo, tz.lo)) - turned_lo;
-        // 3. Angles from the corrected sum T.
-        DoubleFloat t2 = dot2(T, T);
-        precise float t2_lo = t2.lo + 2.0 * dot(T, T_lo);
-        DoubleFloat s2 = quick_two_sum(t2.hi, t2_lo);
-        DoubleFloat lengths = df_mul(s2, dot2(N, N));
-        if (lengths.hi >= SMALLEST_NORMAL) {
-            vec3 across = cross2(N, T) + cross(N, T_lo);
-            DoubleFloat c = dot2(N, T);
-            precise float c_lo = c.lo + dot(N, T_lo);
-            r.cos_h = df_div(quick_two_sum(c.hi, c_lo), df_sqrt(lengths)).hi;
-            r.sin2_h = df_div(dot2(across, across), lengths).hi;
-            float sum2 = s2.hi - s2.hi * (0.5 * length_error);
-            r.cos_d = min(0.5 * sqrt(sum2), 1.0);
-            r.sum2 = sum2;
-        }
-    } else {
-        // The same three steps in f32.
-        vec3 S = L + V;
-        vec3 D = L - V;
-        S -= D * (0.25 * dot(S, D));
-        float s2 = dot(S, S);
-        if (s2 >= SMALLEST_NORMAL) {
-            vec3 H = S * inversesqrt(s2);
-            r.cos_h = dot(N, H);
-            r.sin2_h = sine_squared(N, H);
-            r.cos_d = min(0.5 * sqrt(s2), 1.0);
-            r.sum2 = s2;
-        }
-    }
-    return r;
+    return half_angle_to(N, sum_of_directions(L, V));
 }
 
-// half_angle for a lobe that may be wide. For a shininess of 1 the lobe is the cosine itself, and near 90° a plain sum
+// The same angle `r` for a lobe that may be wide. For a shininess of 1 the lobe is the cosine itself, and near 90° a plain sum
 // leaves no digits of it. So N·S is a sum of exact products here.
-HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V) {
-    HalfAngle r = half_angle(N, L, V);
+HalfAngle phong_half_angle(vec3 N, vec3 L, vec3 V, HalfAngle r) {
     if (ARITHMETIC == STABLE) {
         DoubleFloat l2 = dot2(L, L);
         DoubleFloat v2 = dot2(V, V);
@@ -190,7 +197,7 @@ struct BlinnPhong {
 // @lab phong_lobe: laboratory_forms_agree_with_the_functions_of_pictures
 BlinnPhong blinn_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
     BlinnPhong r;
-    HalfAngle a = phong_half_angle(N, L, V);
+    HalfAngle a = phong_half_angle(N, L, V, half_angle(N, L, V));
     if (ARITHMETIC == FAST) {
         r.cos_in = dot(N, L);
         r.spec = r.cos_in < 0.0 ? 0.0 : phong_lobe(a, shine);
@@ -216,7 +223,7 @@ struct ReciprocalPhong {
 // The BRDF is symmetric in L and V (reciprocity). f_s is 0 for cosθ < 0, and so is L.
 // @lab reciprocal_lobe: laboratory_forms_agree_with_the_functions_of_pictures
 ReciprocalPhong reciprocal_phong(vec3 N, vec3 L, vec3 V, float Lin, float kd, float ks, float shine) {
-    HalfAngle a = phong_half_angle(N, L, V);
+    HalfAngle a = phong_half_angle(N, L, V, half_angle(N, L, V));
     float c = grazing_cosine(N, L);
     ReciprocalPhong r;
     if (ARITHMETIC == FAST) {

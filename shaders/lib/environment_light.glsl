@@ -9,15 +9,15 @@ layout(constant) const bool AMBIENT = false;        // ambient light: the enviro
 layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular lobes
 
 // `mirrored` is the radiance that arrives in the lobe of the base, `coat_mirrored` in that of the coat.
-vec3 environment_light_of(Surface s, BaseAlbedo albedo, vec3 irradiance, vec3 mirrored, vec3 coat_mirrored) {
+vec3 environment_light_of(Surface s, LayerAlbedo albedo, vec3 irradiance, vec3 mirrored, vec3 coat_mirrored) {
     vec3 result = vec3(0.0);
-    if (AMBIENT) result += scattered_radiance(s, albedo, irradiance);
+    if (AMBIENT) result += scattered_radiance(s, albedo.base, irradiance);
     // What comes through from behind has no visibility, with ambient occlusion neither.
-    if (AMBIENT && DIFFUSE_TRANSMISSION) result += transmitted_radiance(s, albedo, environment_irradiance(-s.n));
-    if (REFLECTION && !s.base_traced) result += albedo.base * mirrored;
+    if (AMBIENT && DIFFUSE_TRANSMISSION) result += transmitted_radiance(s, albedo.base, environment_irradiance(-s.n));
+    if (REFLECTION && !s.base_traced) result += albedo.base.base * mirrored;
     if (CLEARCOAT) {
-        result *= BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : under_coat(s);
-        if (REFLECTION && !s.coat_traced) result += albedo_of_coat(s) * coat_mirrored;
+        result *= albedo.under_coat;
+        if (REFLECTION && !s.coat_traced) result += albedo.coat * coat_mirrored;
     }
     return result * s.occlusion;
 }
@@ -48,8 +48,7 @@ vec3 radiance_in_base_lobe(Surface s) {
 }
 
 // Without visibility: the irradiance, and the prefiltered map in the direction of reflection.
-vec3 environment_light(Surface s) {
-    BaseAlbedo albedo = albedo_of_base(s, lobe_reflectance(s));
+vec3 environment_light(Surface s, LayerAlbedo albedo) {
     vec3 irradiance = vec3(0.0);
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);

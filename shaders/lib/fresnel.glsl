@@ -80,7 +80,9 @@ float brewster_term(float c, float n, float g2) {
         term = df_add(df_add(df_mul(c2, two_product(n, n)), DoubleFloat(-1.0, 0.0)), c2).hi;
     } else {
         float n2 = n * n;
-        term = n < 1.0 ? g2 * (n2 + 1.0) - n2 * n2 : c * c * (n2 + 1.0) - 1.0;
+        precise float below_one = g2 * (n2 + 1.0) - n2 * n2;
+        precise float above_one = c * c * (n2 + 1.0) - 1.0;
+        term = n < 1.0 ? below_one : above_one;
     }
     return term;
 }
@@ -88,7 +90,8 @@ float brewster_term(float c, float n, float g2) {
 // T = 2cg(1/s² + n²/p²), s = c + g, p = n²c + g, from 1/s and 1/p: a single sum, so reflected and transmitted power add up
 // to 1 within 2e-7.
 float transmitted_part(float c, float g, float n, float by_s, float by_p) {
-    return 2.0 * (c * g) * (by_s * by_s + n * by_p * (n * by_p));
+    precise float T = 2.0 * (c * g) * (by_s * by_s + n * by_p * (n * by_p));
+    return T;
 }
 
 struct FresnelDielectric {
@@ -105,16 +108,20 @@ struct FresnelDielectric {
 // Total internal reflection (g² ≤ 0, only for n < 1): F = r_s = r_p = 1, cosθ_t = 0. At c = 0, F = 1 for every n: the limit
 // for n ≠ 1. For n = 1 there is no interface, and g is c itself: computed from g², which underflows for c below 1e-19, it
 // would give cosθ_t = 0 and F = 1.
+// Products are precise: where the index is a constant a compiler may take them in another order, and every plan of a scene has to
+// give the same bits.
 FresnelDielectric fresnel_dielectric(float cos_in, float n) {
     FresnelDielectric r = FresnelDielectric(1.0, 1.0, 1.0, 0.0, true);
     if (ARITHMETIC == FAST) {
-        float cos2_t = 1.0 - (1.0 - cos_in * cos_in) / (n * n);
+        precise float cos2_t = 1.0 - (1.0 - cos_in * cos_in) / (n * n);
         if (!(cos2_t < 0.0)) {
             r.tir = false;
             r.cos_t = sqrt(cos2_t);
-            r.rs = (cos_in - n * r.cos_t) / (cos_in + n * r.cos_t);
-            r.rp = (n * cos_in - r.cos_t) / (n * cos_in + r.cos_t);
-            r.F = 0.5 * (r.rs * r.rs + r.rp * r.rp);
+            precise float rs = (cos_in - n * r.cos_t) / (cos_in + n * r.cos_t);
+            precise float rp = (n * cos_in - r.cos_t) / (n * cos_in + r.cos_t);
+            r.rs = rs;
+            r.rp = rp;
+            r.F = 0.5 * (rs * rs + rp * rp);
         }
     } else {
         float c = clamp(cos_in, 0.0, 1.0);
@@ -125,13 +132,15 @@ FresnelDielectric fresnel_dielectric(float cos_in, float n) {
             float difference = (index - 1.0) * (index + 1.0);
             // Two divisions instead of seven.
             float by_s = 1.0 / (c + g);
-            float by_p = 1.0 / (index * index * c + g);
+            precise float by_p = 1.0 / (index * index * c + g);
             // Below the normal range some operations flush the cosine to 0 and others do not.
             bool grazes = c < SMALLEST_NORMAL;
             r.tir = false;
             r.cos_t = min(g / index, 1.0);
-            r.rs = grazes ? -1.0 : -difference * by_s * by_s;
-            r.rp = grazes ? -1.0 : (difference * by_p) * (brewster_term(c, index, g2) * by_p);
+            precise float rs = -difference * by_s * by_s;
+            precise float rp = (difference * by_p) * (brewster_term(c, index, g2) * by_p);
+            r.rs = grazes ? -1.0 : rs;
+            r.rp = grazes ? -1.0 : rp;
             // 1 − T where little is transmitted: the error is T times the relative error of T.
             float T = index == 1.0 ? 1.0 : transmitted_part(c, g, index, by_s, by_p);
             r.F = grazes ? 1.0 : T < 0.5 ? 1.0 - T : min(0.5 * (r.rs * r.rs + r.rp * r.rp), 1.0);

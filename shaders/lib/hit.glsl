@@ -195,8 +195,6 @@ struct HitSurface {
     vec3 sigma_thickness;
 };
 
-#define TEXEL(page, slot) hit_texture_or(id, slot, point.uvs, footprint, vec4(1.0))
-
 // Whether a ray meets the front of a triangle of normal n.
 bool is_front(vec3 n, vec3 direction) {
     return dot(n, direction) <= 0.0;
@@ -215,25 +213,34 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     float cos_v = abs(dot(point.n, direction));
     float footprint = width * point.uv_per_metre / max(cos_v, 0.05);
     Texels t = texels_of_nothing(point.color);
-    READ_TEXELS(t)
+    vec3 normal = vec3(0.0, 0.0, 1.0);
+    vec3 coat_normal = normal;
+    if (HIT_TEXTURES != 0) {
+        // Texture by texture: the code that reads one stands once in a program.
+        for (uint left = HIT_TEXTURES; left != 0; left &= left - 1) {
+            uint slot = uint(findLSB(left));
+            if (has_hit_texture(id, slot)) {
+                vec4 value = hit_texture(id, slot, point.uvs, footprint);
+                put_texel(t, HIT_TEXTURES, slot, value);
+                if (slot == SLOT_NORMAL) normal = value.xyz * 2.0 - 1.0;
+                if (slot == SLOT_CLEARCOAT_NORMAL) coat_normal = value.xyz * 2.0 - 1.0;
+            }
+        }
+    }
     r.transmits = m.transmission * t.transmission;
     r.thickness = point.scale * t.thickness;
     vec3 n = point.n_smooth;
     vec3 n_coat = n;
     if ((HIT_TEXTURES & (1u << SLOT_NORMAL)) != 0) {
-        vec3 texel = hit_texture_or(id, SLOT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
-        vec3 bent = bent_normal(point.n_smooth, point.t_smooth, vec3(texel.xy * m.normal_scale, texel.z));
+        vec3 bent = bent_normal(point.n_smooth, point.t_smooth, vec3(normal.xy * m.normal_scale, normal.z));
         n = has_hit_texture(id, SLOT_NORMAL) ? bent : n;
     }
     if ((HIT_TEXTURES & (1u << SLOT_CLEARCOAT_NORMAL)) != 0) {
-        vec3 texel = hit_texture_or(id, SLOT_CLEARCOAT_NORMAL, point.uvs, footprint, vec4(0.5, 0.5, 1.0, 1.0)).xyz * 2.0 - 1.0;
-        vec3 bent = bent_normal(point.n_smooth, point.t_smooth, texel);
+        vec3 bent = bent_normal(point.n_smooth, point.t_smooth, coat_normal);
         n_coat = has_hit_texture(id, SLOT_CLEARCOAT_NORMAL) ? bent : n_coat;
     }
     if (ANISOTROPY) {
-        bool textured = has_hit_texture(id, SLOT_ANISOTROPY);
-        t.tangent = anisotropy_direction(n, point.t_smooth, textured ? anisotropy.rg * 2.0 - 1.0 : vec2(1.0, 0.0),
-                                         lobe_factors(id, LOBE_ANISOTROPY).yz);
+        t.tangent = anisotropy_direction(n, point.t_smooth, t.tangent.xy, lobe_factors(id, LOBE_ANISOTROPY).yz);
     }
     r.front = is_front(point.n, direction);
     float side = r.front ? 1.0 : -1.0;

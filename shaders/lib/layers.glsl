@@ -27,17 +27,21 @@ layout(constant) const bool TRANSMISSIVE = false; // some material transmits lig
 // --------------------------------------------------------------------------------------------------------------------
 // Fresnel reflectance of each layer
 
-// Fresnel reflectance of the interface from n1 to n2, as its position between the values at normal and at grazing
-// incidence. 1 for total internal reflection; 0 for equal indices, where Schlick's curve would rise at grazing incidence
+// Fresnel reflectance of the interface from n1 to n2 by the exact curve, as its position between the values at normal and at
+// grazing incidence.
+float exact_share(float cos_in, float n1, float n2) {
+    float r0 = nested_f0(n1, n2);
+    // Some devices do not divide by 1 exactly.
+    float reflectance = fresnel_dielectric(cos_in, n1 == 1.0 ? n2 : n2 / n1).F;
+    // Where a quotient may be off by some roundings, x/x is not 1, and total internal reflection would be missed.
+    return reflectance >= 1.0 ? 1.0 : clamp((reflectance - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
+}
+
+// The same by the curve of the knob `fresnel`. 1 for total internal reflection; 0 for equal indices, where Schlick's curve would rise at grazing incidence
 // all the same.
 float boundary_share(float cos_in, float n1, float n2) {
     if (n1 == n2) return 0.0;
-    if (FRESNEL == FRESNEL_EXACT) {
-        float r0 = nested_f0(n1, n2);
-        float reflectance = fresnel_dielectric(cos_in, n2 / n1).F;
-        // Where a quotient may be off by some roundings, x/x is not 1, and total internal reflection would be missed.
-        return reflectance >= 1.0 ? 1.0 : clamp((reflectance - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
-    }
+    if (FRESNEL == FRESNEL_EXACT) return exact_share(cos_in, n1, n2);
     float sin2 = max(1.0 - cos_in * cos_in, 0.0) * (n1 / n2) * (n1 / n2);
     float cos_thin = n1 > n2 ? sqrt(max(1.0 - sin2, 0.0)) : cos_in;
     return n1 > n2 && sin2 >= 1.0 ? 1.0 : schlick_weight(cos_thin);
@@ -66,10 +70,7 @@ vec3 metal_under_film(Surface s, Film film, vec3 bare) {
 // mapped to the range from F0 to F90.
 vec3 fresnel_of_dielectric(Surface s, float cos_in) {
     if (FRESNEL == FRESNEL_SCHLICK) return schlick(s.f0_dielectric, s.f90_dielectric, cos_in);
-    float r0 = nested_f0(s.n_outside, s.ior);
-    float n = s.n_outside == 1.0 ? s.ior : s.ior / s.n_outside;
-    float share = clamp((fresnel_dielectric(cos_in, n).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
-    return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * share;
+    return s.f0_dielectric + (vec3(s.f90_dielectric) - s.f0_dielectric) * exact_share(cos_in, s.n_outside, s.ior);
 }
 
 // Fresnel reflectance of the metallic part without its film. Metals given by a colour have no n and κ: Schlick on every rung. For metals
@@ -105,19 +106,16 @@ BaseFresnel fresnel_of_base(Surface s, float cos_in) {
 float fresnel_of_coat(Surface s, float cos_in) {
     float f;
     if (FRESNEL == FRESNEL_EXACT) {
-        // In air from constants: drivers round constant expressions differently, and both plans of a scene have to agree
-        // (with a selected index 6 pixels of ClearCoatTest do not).
-        bool in_air = s.n_outside == 1.0;
-        f = in_air ? fresnel_dielectric(cos_in, COAT_INDEX).F : fresnel_dielectric(cos_in, COAT_INDEX / s.n_outside).F;
+        f = fresnel_dielectric(cos_in, s.n_outside == 1.0 ? COAT_INDEX : COAT_INDEX / s.n_outside).F;
     } else {
         f = schlick(vec3(COAT_F0), 1.0, cos_in).x;
     }
     return s.clearcoat * f;
 }
 
-// Energy left under the clear coat, at the viewer's angle.
+// Energy left under the clear coat, at the viewer's angle; 1 without a coat.
 float under_coat(Surface s) {
-    return 1.0 - fresnel_of_coat(s, clamp(dot(s.n_coat, s.v), 0.0, 1.0));
+    return CLEARCOAT ? 1.0 - fresnel_of_coat(s, clamp(dot(s.n_coat, s.v), 0.0, 1.0)) : 1.0;
 }
 
 // --------------------------------------------------------------------------------------------------------------------
@@ -299,23 +297,20 @@ struct FacetFresnel {
 FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     Surface s = b.s;
     FacetFresnel f;
-    f.total = false;
-    if (b.between) {
-        float share = boundary_share(cos_in, b.n1, b.n2);
-        float in_air = nested_f0(1.0, s.ior);
-        vec3 f0 = b.solid ? s.f0_dielectric * (in_air > 0.0 ? nested_f0(b.n1, b.n2) / in_air : 0.0) : s.f0_dielectric;
-        f.total = b.solid && share >= 1.0;
-        f.dielectric = f0 + (vec3(s.f90_dielectric) - f0) * share;
-    } else {
-        f.dielectric = fresnel_of_dielectric(s, cos_in);
-    }
+    float n1 = b.between ? b.n1 : s.n_outside;
+    float n2 = b.between ? b.n2 : s.ior;
+    float share = b.between || FRESNEL == FRESNEL_EXACT ? boundary_share(cos_in, n1, n2) : schlick_weight(cos_in);
+    float in_air = nested_f0(1.0, s.ior);
+    vec3 f0 = s.f0_dielectric;
+    if (b.solid) f0 *= in_air > 0.0 ? nested_f0(n1, n2) / in_air : 0.0;
+    f.total = b.solid && share >= 1.0;
+    f.dielectric = f0 + (vec3(s.f90_dielectric) - f0) * share;
     vec3 metal = fresnel_of_metal(s, cos_in);
     if (IRIDESCENCE) {
-        float n1 = b.between ? b.n1 : s.n_outside;
         Film film = film_of(s, cos_in, n1);
         // Of a closed dielectric mesh f0_dielectric is that in air.
-        float r0 = b.solid ? nested_f0(1.0, s.ior) : nested_f0(n1, s.ior);
-        f.dielectric = under_film(s, film, f.dielectric, b.between ? b.n2 : s.ior, r0);
+        float r0 = b.solid ? in_air : nested_f0(n1, s.ior);
+        f.dielectric = under_film(s, film, f.dielectric, n2, r0);
         metal = metal_under_film(s, film, metal);
     }
     f.dielectric = f.total ? vec3(1.0) : f.dielectric;
@@ -331,9 +326,25 @@ float diffuse_through_share(Surface s) {
     return DIFFUSE_TRANSMISSION && through > 0.0 ? through / (reflected + through) : 0.0;
 }
 
+// The directional albedos of a surface's layers.
+struct LayerAlbedo {
+    BaseAlbedo base;
+    float coat;       // 0 without a coat
+    float under_coat; // energy left under the coat; 1 without one
+};
+
+LayerAlbedo layer_albedo(Surface s) {
+    LayerAlbedo r = LayerAlbedo(albedo_of_base(s, lobe_reflectance(s)), 0.0, 1.0);
+    if (CLEARCOAT) {
+        r.coat = albedo_of_coat(s);
+        r.under_coat = BRDF == BRDF_GGX_MULTI ? 1.0 - min(r.coat, 1.0) : under_coat(s);
+    }
+    return r;
+}
+
 // The layers of an opaque surface whose base is a rough lobe for every roughness: for lighting by punctual lights and by
 // the prefiltered environment.
-Layers layers_of(Surface s) {
+Layers layers_of(Surface s, LayerAlbedo albedo) {
     Layers b;
     b.s = s;
     b.cos_v = max(cosine(s.n, s.v), 1e-4);
@@ -347,8 +358,8 @@ Layers layers_of(Surface s) {
     b.f_dielectric = vec3(0.0);
     b.f_base = vec3(0.0);
     b.total = false;
-    b.enters = BRDF == BRDF_GGX_MULTI ? ground_share(albedo_of_base(s, lobe_reflectance(s))) : 1.0;
-    b.under = CLEARCOAT && BRDF == BRDF_GGX_MULTI ? 1.0 - min(albedo_of_coat(s), 1.0) : 1.0;
+    b.enters = BRDF == BRDF_GGX_MULTI ? ground_share(albedo.base) : 1.0;
+    b.under = BRDF == BRDF_GGX_MULTI ? albedo.under_coat : 1.0;
     b.left = left_to_base(s);
     b.through_share = diffuse_through_share(s);
     b.tint = vec3(0.0);
@@ -369,9 +380,13 @@ bool shines_through(Layers b) {
     return DIFFUSE_TRANSMISSION && largest(b.s.diffuse_through) > 0.0;
 }
 
-// Transmittance of a surface that does not deflect light.
+// Transmittance of a surface that does not deflect light: the colour of what it transmits, and what of the light enters.
+vec3 straight_transmittance(vec3 tint, float transmits, vec3 f_dielectric, float under, float left) {
+    return tint * (transmits * (1.0 - largest(f_dielectric)) * under * left);
+}
+
 vec3 straight_transmittance(Layers b) {
-    return b.tint * (b.transmits * (1.0 - largest(b.f_dielectric)) * b.under * b.left);
+    return straight_transmittance(b.tint, b.transmits, b.f_dielectric, b.under, b.left);
 }
 
 struct BaseLobe {
@@ -412,13 +427,15 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
     BsdfEval r = BsdfEval(vec3(0.0), 0.0);
     float cos_l = cosine(s.n, l);
     const bool phong = BRDF == BRDF_BLINN_PHONG || BRDF == BRDF_BLINN_PHONG_RECIPROCAL;
+    DirectionSum sum = sum_of_directions(l, s.v);
     // Self-shadowing (lecture B9).
     if (cos_l > 0.0) {
         float enters = b.enters;
         vec3 lobe = vec3(0.0);       // the part of the BRDF that is multiplied by cosθ_l
         vec3 lobe_alone = vec3(0.0); // the part that is not
+        HalfAngle h = half_angle_to(s.n, sum);
         if (!b.delta) {
-            HalfAngle h = phong ? phong_half_angle(s.n, l, s.v) : half_angle(s.n, l, s.v);
+            if (phong) h = phong_half_angle(s.n, l, s.v, h);
             BaseLobe base = base_lobe(b, l, cos_l, h);
             if (phong) {
                 // k_s makes the albedo of B6's lobe at normal incidence F0 in the limit of a narrow lobe only (shininess →
@@ -443,14 +460,14 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         r.f_cos = (s.diffuse * diffuse_brdf(enters) + lobe) * cos_l;
         if (BRDF == BRDF_BLINN_PHONG) r.f_cos += lobe_alone;
         // For light from l to the eye, sheen leaves the smaller of its values for both directions (KHR_materials_sheen).
-        if (SHEEN) r.f_cos = r.f_cos * min(b.left, left_by_sheen(s, cos_l)) + sheen_lobe(s, l, cos_l, b.cos_v);
+        if (SHEEN) r.f_cos = r.f_cos * min(b.left, left_by_sheen(s, cos_l)) + sheen_lobe(s, h.sin2_h, cos_l, b.cos_v);
         r.pdf += b.shares.z * (1.0 - b.through_share) * cos_l * INV_PI;
     }
     if (CLEARCOAT) {
         if (b.coat_delta) {
             r.f_cos *= b.under;
         } else {
-            HalfAngle h = half_angle(s.n_coat, l, s.v);
+            HalfAngle h = half_angle_to(s.n_coat, sum);
             float f = fresnel_of_coat(s, h.cos_d);
             float coat_l = max(cosine(s.n_coat, l), 0.0);
             float coat_v = max(cosine(s.n_coat, s.v), 1e-4);

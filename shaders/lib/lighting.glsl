@@ -155,9 +155,10 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
 // environment.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, LightRange range, bool all_around) {
-    vec3 result = radiance_from_lights(layers_of(s), pixel, surface, tiles_across, range);
-    vec3 around = CLEARCOAT ? s.emissive * under_coat(s) : s.emissive;
-    if (AMBIENT || REFLECTION) around += environment_light(s);
+    LayerAlbedo albedo = layer_albedo(s);
+    vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
+    vec3 around = s.emissive * under_coat(s);
+    if (AMBIENT || REFLECTION) around += environment_light(s, albedo);
     result += all_around ? around : vec3(0.0);
     return s.unlit ? all_around ? s.base : vec3(0.0) : result;
 }

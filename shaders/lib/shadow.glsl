@@ -72,12 +72,12 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
         }
     }
     media = after;
-    Layers b = layers_of(hit.s);
-    b.tint = tint_through(hit.s.base, point.sheet, hit.front, hit.sigma_thickness * hit.thickness);
-    b.transmits = hit.transmits * (1.0 - hit.s.metallic);
-    b.f_dielectric = straight_reflectance(hit.s, cos_v, n1, n2);
-    b.under = CLEARCOAT ? 1.0 - fresnel_of_coat(hit.s, cos_v) : 1.0;
-    return blend(vec3(1.0), straight_transmittance(b), hit.coverage);
+    vec3 tint = tint_through(hit.s.base, point.sheet, hit.front, hit.sigma_thickness * hit.thickness);
+    float transmits = hit.transmits * (1.0 - hit.s.metallic);
+    vec3 reflected = straight_reflectance(hit.s, cos_v, n1, n2);
+    float under = CLEARCOAT ? 1.0 - fresnel_of_coat(hit.s, cos_v) : 1.0;
+    vec3 passes = straight_transmittance(tint, transmits, reflected, under, left_to_base(hit.s));
+    return blend(vec3(1.0), passes, hit.coverage);
 }
 
 // A known hit with its barycentric coordinates recomputed.

@@ -42,14 +42,13 @@ float left_by_sheen_of_all(Surface s, float cos_v) {
     return 1.0 - largest(s.sheen.rgb) * (e.x * (1.0 - cos_v * cos_v) + e.y);
 }
 
-// The lobe for light from l, times cosθ. For a roughness below 0.26 and less than 3° above the horizon, the fit sends more
+// The lobe at a half vector, times cosθ_l. For a roughness below 0.26 and less than 3° above the horizon, the fit sends more
 // than it receives (E up to 2.9); there it is scaled to conserve energy.
-vec3 sheen_lobe(Surface s, vec3 l, float cos_l, float cos_v) {
+vec3 sheen_lobe(Surface s, float sin2_h, float cos_l, float cos_v) {
     float roughness = max(s.sheen.a, LEAST_SHEEN_ROUGHNESS);
     float alpha = roughness * roughness;
-    HalfAngle h = half_angle(s.n, l, s.v);
     float low_l = max(cos_l, 1e-4);
-    float d = (2.0 + 1.0 / alpha) * pow(h.sin2_h, 0.5 / alpha) * (0.5 * INV_PI);
+    float d = (2.0 + 1.0 / alpha) * pow(sin2_h, 0.5 / alpha) * (0.5 * INV_PI);
     float v = 1.0 / ((1.0 + sheen_lambda(low_l, alpha) + sheen_lambda(cos_v, alpha)) * 4.0 * low_l * cos_v);
     float most = max(reflectance_texel(sqrt(cos_v), roughness).b, 1.0);
     return s.sheen.rgb * (d * v * cos_l / most);

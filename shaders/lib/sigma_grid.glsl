@@ -67,24 +67,23 @@ vec3 mean_sigma(uint at, vec3 p, vec3 direction, float d) {
     vec4 w = quadrature_weights(QUADRATURE);
     vec3 sum = vec3(0.0);
     vec3 rest = vec3(0.0);
-    for (uint i = 0u; i < steps; i += 4u) {
-        vec4 n = float(i) + vec4(0.0, 1.0, 2.0, 3.0);
-        if (w.x != 0.0) {
-            add_sigma(sum, rest, w.x * sigma_at(grid, start + stride * n.x));
-            add_sigma(sum, rest, w.x * sigma_at(grid, start + stride * n.y));
-            add_sigma(sum, rest, w.x * sigma_at(grid, start + stride * n.z));
-            add_sigma(sum, rest, w.x * sigma_at(grid, start + stride * n.w));
-        }
-        if (w.y != 0.0) {
-            add_sigma(sum, rest, w.y * sigma_at(grid, start + stride * (n.x + 0.5)));
-            add_sigma(sum, rest, w.y * sigma_at(grid, start + stride * (n.y + 0.5)));
-            add_sigma(sum, rest, w.y * sigma_at(grid, start + stride * (n.z + 0.5)));
-            add_sigma(sum, rest, w.y * sigma_at(grid, start + stride * (n.w + 0.5)));
-        }
+    // Simpson's rule reads both ends and the middle of a step, so it goes by half steps, whose weights alternate. Four points
+    // an iteration: lavapipe ends all loops of an invocation after 65,535.
+    bool both = w.x != 0.0 && w.y != 0.0;
+    float spacing = both ? 0.5 : 1.0;
+    float offset = w.x != 0.0 ? 0.0 : 0.5;
+    vec2 weights = both ? w.xy : vec2(w.x + w.y);
+    uint points = both ? 2u * steps : steps;
+    for (uint i = 0u; i < points; i += 4u) {
+        vec4 n = (float(i) + vec4(0.0, 1.0, 2.0, 3.0)) * spacing + offset;
+        add_sigma(sum, rest, weights.x * sigma_at(grid, start + stride * n.x));
+        add_sigma(sum, rest, weights.y * sigma_at(grid, start + stride * n.y));
+        add_sigma(sum, rest, weights.x * sigma_at(grid, start + stride * n.z));
+        add_sigma(sum, rest, weights.y * sigma_at(grid, start + stride * n.w));
     }
-    if (w.z != 0.0) {
-        add_sigma(sum, rest, w.z * sigma_at(grid, start + stride * float(steps)));
-        add_sigma(sum, rest, -w.z * sigma_at(grid, start));
+    // The end of the last step, and less the start of the first.
+    for (uint end = 0u; w.z != 0.0 && end < 2u; end++) {
+        add_sigma(sum, rest, (end == 0u ? w.z : -w.z) * sigma_at(grid, start + stride * (end == 0u ? float(steps) : 0.0)));
     }
     vec3 mean = (sum + rest) / (w.w * float(steps));
     return MARCH_COLOURS ? mean : mean.xxx;

@@ -36,13 +36,29 @@ vec4 page_texel(sampler2DArray page, uint slot) {
     if ((TEXTURES & (1u << slot)) != 0) texel = texture(page, page_coordinates(ids.y, slot, uv), lod_bias);
     return texel;
 }
-#define TEXEL(page, slot) page_texel(page, slot)
+#define READ(page, slot) put_texel(s.texels, TEXTURES, slot, page_texel(page, slot));
 
 SurfaceFragment surface_fragment() {
     SurfaceFragment s;
     // Not the interpolated constant: perspective interpolation turns 1 into 0.99999994, which a half rounds to 0.9995.
     s.texels = texels_of_nothing(HAS_COLOR ? vertex_color : vec4(1.0));
-    READ_TEXELS(s.texels)
+    READ(base_page, SLOT_BASE)
+    READ(metallic_roughness_page, SLOT_METALLIC_ROUGHNESS)
+    READ(occlusion_page, SLOT_OCCLUSION)
+    READ(emissive_page, SLOT_EMISSIVE)
+    READ(clearcoat_page, SLOT_CLEARCOAT)
+    READ(clearcoat_roughness_page, SLOT_CLEARCOAT_ROUGHNESS)
+    READ(specular_page, SLOT_SPECULAR)
+    READ(transmission_page, SLOT_TRANSMISSION)
+    READ(thickness_page, SLOT_THICKNESS)
+    READ(sheen_color_page, SLOT_SHEEN_COLOR)
+    READ(sheen_roughness_page, SLOT_SHEEN_ROUGHNESS)
+    READ(specular_color_page, SLOT_SPECULAR_COLOR)
+    READ(anisotropy_page, SLOT_ANISOTROPY)
+    READ(iridescence_page, SLOT_IRIDESCENCE)
+    READ(iridescence_thickness_page, SLOT_IRIDESCENCE_THICKNESS)
+    READ(diffuse_transmission_page, SLOT_DIFFUSE_TRANSMISSION)
+    READ(diffuse_transmission_color_page, SLOT_DIFFUSE_TRANSMISSION_COLOR)
 
     // The geometric normal from positions of neighbouring fragments: they lie in the plane of the triangle.
     vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
@@ -61,9 +77,8 @@ SurfaceFragment surface_fragment() {
     }
     if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, page_texel(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
     if (ANISOTROPIC) {
-        bool textured = (TEXTURES & (1u << SLOT_ANISOTROPY)) != 0;
         vec2 rotation = material_texel(ids.y, MATERIAL_LOBES_AT + int(LOBE_ANISOTROPY)).yz;
-        s.texels.tangent = anisotropy_direction(s.n_shading, t_rel, textured ? anisotropy.rg * 2.0 - 1.0 : vec2(1.0, 0.0), rotation);
+        s.texels.tangent = anisotropy_direction(s.n_shading, t_rel, s.texels.tangent.xy, rotation);
     }
     // From behind the whole normal is reversed, normal map included (glTF 2.0, section 3.9.5, double sided).
     if (!gl_FrontFacing) {

@@ -50,7 +50,7 @@ struct Texels {
     vec4 sheen; // colour, roughness
     vec3 specular_color;
     float anisotropy;          // strength
-    vec3 tangent;              // unit direction along which the base's lobe is wide, world axes
+    vec3 tangent;              // unit direction along which the base's lobe is wide, world axes; as a texel in the frame of tangents
     vec2 iridescence;          // factor, thickness
     vec4 diffuse_transmission; // colour, factor
 };
@@ -60,27 +60,35 @@ Texels texels_of_nothing(vec4 vertex_color) {
                   vec4(1.0));
 }
 
-// Reads all textures but the normal maps. TEXEL(page, slot) is a vec4, white where the material has no such texture.
-// Rasterised surfaces read samplers, ray hits read by index (lib/surface_fragment.glsl, lib/hit.glsl).
-#define READ_TEXELS(t) \
-    t.base *= TEXEL(base_page, SLOT_BASE); \
-    vec4 metallic_roughness = TEXEL(metallic_roughness_page, SLOT_METALLIC_ROUGHNESS); \
-    t.roughness = metallic_roughness.g; \
-    t.metallic = metallic_roughness.b; \
-    t.occlusion = TEXEL(occlusion_page, SLOT_OCCLUSION).r; \
-    t.emissive = TEXEL(emissive_page, SLOT_EMISSIVE).rgb; \
-    t.clearcoat = TEXEL(clearcoat_page, SLOT_CLEARCOAT).r; \
-    t.clearcoat_roughness = TEXEL(clearcoat_roughness_page, SLOT_CLEARCOAT_ROUGHNESS).g; \
-    t.specular = TEXEL(specular_page, SLOT_SPECULAR).a; \
-    t.transmission = TEXEL(transmission_page, SLOT_TRANSMISSION).r; \
-    t.thickness = TEXEL(thickness_page, SLOT_THICKNESS).g; \
-    t.sheen = vec4(TEXEL(sheen_color_page, SLOT_SHEEN_COLOR).rgb, TEXEL(sheen_roughness_page, SLOT_SHEEN_ROUGHNESS).a); \
-    t.specular_color = TEXEL(specular_color_page, SLOT_SPECULAR_COLOR).rgb; \
-    vec3 anisotropy = TEXEL(anisotropy_page, SLOT_ANISOTROPY).rgb; \
-    t.anisotropy = anisotropy.b; \
-    t.iridescence = vec2(TEXEL(iridescence_page, SLOT_IRIDESCENCE).r, TEXEL(iridescence_thickness_page, SLOT_IRIDESCENCE_THICKNESS).g); \
-    t.diffuse_transmission = vec4(TEXEL(diffuse_transmission_color_page, SLOT_DIFFUSE_TRANSMISSION_COLOR).rgb, \
-                                  TEXEL(diffuse_transmission_page, SLOT_DIFFUSE_TRANSMISSION).a);
+// Puts the value of the texture in `slot` where it belongs; `used` has the bits of all slots that some material uses.
+// Normal maps are put by the callers, which have the frames for them.
+#define PUT(name) if ((used & (1u << name)) != 0 && slot == name)
+void put_texel(inout Texels t, uint used, uint slot, vec4 value) {
+    PUT(SLOT_BASE) t.base *= value;
+    PUT(SLOT_METALLIC_ROUGHNESS) {
+        t.roughness = value.g;
+        t.metallic = value.b;
+    }
+    PUT(SLOT_OCCLUSION) t.occlusion = value.r;
+    PUT(SLOT_EMISSIVE) t.emissive = value.rgb;
+    PUT(SLOT_CLEARCOAT) t.clearcoat = value.r;
+    PUT(SLOT_CLEARCOAT_ROUGHNESS) t.clearcoat_roughness = value.g;
+    PUT(SLOT_SPECULAR) t.specular = value.a;
+    PUT(SLOT_TRANSMISSION) t.transmission = value.r;
+    PUT(SLOT_THICKNESS) t.thickness = value.g;
+    PUT(SLOT_SHEEN_COLOR) t.sheen.rgb = value.rgb;
+    PUT(SLOT_SHEEN_ROUGHNESS) t.sheen.a = value.a;
+    PUT(SLOT_SPECULAR_COLOR) t.specular_color = value.rgb;
+    PUT(SLOT_ANISOTROPY) {
+        t.anisotropy = value.b;
+        t.tangent.xy = value.rg * 2.0 - 1.0;
+    }
+    PUT(SLOT_IRIDESCENCE) t.iridescence.x = value.r;
+    PUT(SLOT_IRIDESCENCE_THICKNESS) t.iridescence.y = value.g;
+    PUT(SLOT_DIFFUSE_TRANSMISSION) t.diffuse_transmission.a = value.a;
+    PUT(SLOT_DIFFUSE_TRANSMISSION_COLOR) t.diffuse_transmission.rgb = value.rgb;
+}
+#undef PUT
 
 // The layers over and under the base, and the normal of the clear coat, packed into four words of the G-buffer and the
 // fragment list:

@@ -34,7 +34,8 @@ float film_reflectance(float a, float rho, float cos_phi) {
 vec3 film_sensitivity(float path) {
     float micrometres = path * 1e-3;
     vec4 turns = vec4(1.6810, 1.7953, 2.2084, 2.2399) * micrometres;
-    vec4 waves = vec4(cos_of_turns(turns.x), cos_of_turns(turns.y), cos_of_turns(turns.z), cos_of_turns(turns.w));
+    vec4 waves;
+    for (int i = 0; i < 4; i++) waves[i] = cos_of_turns(turns[i]);
     float k = 2.0 * PI * micrometres;
     vec4 gaussians = waves * exp(vec4(-4.3278e-3, -9.3046e-3, -6.6121e-3, -4.5282e-3) * (k * k));
     // X has two, weighted by their areas.

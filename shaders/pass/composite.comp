@@ -109,12 +109,9 @@ void main() {
         }
         // 4. Transmittance: light that is not reflected passes, tinted by the base colour and absorbed over the nominal
         //    thickness (A1). It passes straight, or with refraction `screen` bent where a solid is entered.
-        Layers b = layers_of(s);
-        b.tint = s.base * exp(-m.sigma_thickness * scale);
-        b.transmits = transmission * (1.0 - s.metallic);
-        b.f_dielectric = fresnel_of_base(s, clamp(dot(s.n, s.v), 0.0, 1.0)).dielectric;
-        b.under = CLEARCOAT ? under_coat(s) : 1.0;
-        vec3 passes = straight_transmittance(b);
+        vec3 tint = s.base * exp(-m.sigma_thickness * scale);
+        vec3 reflected = fresnel_of_base(s, clamp(dot(s.n, s.v), 0.0, 1.0)).dielectric;
+        vec3 passes = straight_transmittance(tint, transmission * (1.0 - s.metallic), reflected, under_coat(s), left_to_base(s));
         keep_diffuse(s, 1.0 - transmission);
         // 5. Lighting of the fragment.
         float alpha = blue_alpha.y;

@@ -1,5 +1,5 @@
 //! The material at one point of a surface, in f64 on the host: texels and vertex colours multiplied into its factors.
-//! The twin of `READ_TEXELS` (shaders/lib/texels.glsl) and `hit_texture` (shaders/lib/hit.glsl) for a picked pixel.
+//! The twin of `put_texel` (shaders/lib/texels.glsl) and `hit_texture` (shaders/lib/hit.glsl) for a picked pixel.
 //!
 //! Read glTF 2.0, section 3.9, and KHR_texture_transform. A texture is read at its finest level, bilinearly or by its
 //! nearest texel: pictures filter it over a pixel, and agree where a texel is larger than a pixel.
