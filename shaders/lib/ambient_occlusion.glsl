@@ -26,75 +26,61 @@ layout(pass, scalar) readonly buffer SkyDirections { SkyDirection sky_directions
 const uint BASE_LOBE_EVENT = 0x400u;
 const uint COAT_LOBE_EVENT = 0x401u;
 
-struct Seen {
-    vec3 irradiance;         // share of the irradiance that arrives
+vec3 visibility_of_environment(Surface s, vec3 direction, bool wanted) {
+    return visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, direction, LARGEST, wanted);
+}
+
+struct VisibleIrradiance {
+    vec3 share;              // of the irradiance that arrives
     vec3 occluded_share;     // of the directions, by cosine and solid angle
     vec3 occluded_direction; // sum of the occluded directions
-    vec3 base_lobe;          // share of each specular lobe that sees the environment, by the weights of its directions
-    vec3 coat_lobe;
 };
 
-// One ray after the other, first for the irradiance, then in the lobe of the base, then in that of the coat: the code that
-// traces exists once. Directions between the triangle's plane and that of the interpolated normal count nowhere: a smooth
-// convex mesh does not occlude itself. An anisotropic lobe counts as a round one of the α across.
-Seen seen_of_environment(Surface s) {
+// Directions between the triangle's plane and that of the interpolated normal count nowhere: a smooth convex mesh does not
+// occlude itself.
+VisibleIrradiance visible_irradiance(Surface s) {
     vec3 seen = vec3(0.0);
     vec3 all = vec3(0.0);
     vec3 occluded = vec3(0.0);
     vec3 occluded_direction = vec3(0.0);
     float hemisphere = 0.0;
-    vec3 seen_in_base = vec3(0.0);
-    vec3 seen_in_coat = vec3(0.0);
-    float all_in_base = 0.0;
-    float all_in_coat = 0.0;
-    const uint rays = OCCLUSION_RAYS + (REFLECTION ? LOBE_RAYS * (CLEARCOAT ? 2u : 1u) : 0u);
-    for (uint i = 0; i < rays && loop_iterations < LOOP_BUDGET; i++) {
-        bool in_lobe = REFLECTION && LOBE_RAYS > 0 && i >= OCCLUSION_RAYS;
-        bool coat = CLEARCOAT && in_lobe && i >= OCCLUSION_RAYS + LOBE_RAYS;
-        vec3 direction;
-        vec3 weight;
-        float projected;
-        if (in_lobe) {
-            if (coat ? s.coat_traced : s.base_traced) continue;
-            uint index = trace_terms.sample_index * LOBE_RAYS + (i - OCCLUSION_RAYS) % LOBE_RAYS;
-            vec3 n = coat ? s.n_coat : s.n;
-            float alpha = coat ? s.clearcoat_alpha : s.alpha;
-            uint event = coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT;
-            vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
-            direction = reflect_ray(-s.v, h).R;
-            projected = unshadowed(n, s.v, direction, s.n_triangle, alpha);
-            weight = vec3(projected);
-        } else {
-            SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
-            direction = sky.direction;
-            float cos_l = dot(s.n_triangle, direction) > 0.0 ? max(dot(s.n, direction), 0.0) : 0.0;
-            weight = light_of_environment(sky.weight) * cos_l;
-            projected = cos_l * sky.solid_angle;
-        }
-        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, direction, LARGEST, projected > 0.0);
-        if (coat) {
-            seen_in_coat += weight * visible;
-            all_in_coat += projected;
-        } else if (in_lobe) {
-            seen_in_base += weight * visible;
-            all_in_base += projected;
-        } else {
-            seen += weight * visible;
-            all += weight;
-            hemisphere += projected;
-            // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
-            vec3 hidden = 1.0 - visible;
-            occluded += projected * hidden;
-            occluded_direction += direction * (projected * mean(hidden));
-        }
+    // Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass takes 3
+    // to 6 % longer.
+    for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
+        SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
+        float cos_l = dot(s.n_triangle, sky.direction) > 0.0 ? max(dot(s.n, sky.direction), 0.0) : 0.0;
+        vec3 weight = light_of_environment(sky.weight) * cos_l;
+        vec3 visible = visibility_of_environment(s, sky.direction, cos_l > 0.0);
+        seen += weight * visible;
+        all += weight;
+        float projected = cos_l * sky.solid_angle;
+        hemisphere += projected;
+        // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
+        vec3 hidden = 1.0 - visible;
+        occluded += projected * hidden;
+        occluded_direction += sky.direction * (projected * mean(hidden));
     }
-    Seen r;
-    r.irradiance = mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+    VisibleIrradiance r;
+    r.share = mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
     r.occluded_share = occluded / max(hemisphere, 1e-30);
     r.occluded_direction = occluded_direction;
-    r.base_lobe = all_in_base > 0.0 ? seen_in_base / all_in_base : vec3(1.0);
-    r.coat_lobe = all_in_coat > 0.0 ? seen_in_coat / all_in_coat : vec3(1.0);
     return r;
+}
+
+// Share of a specular lobe that sees the environment, by the weights of its directions. An anisotropic lobe counts as a
+// round one of the α across.
+vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
+    vec3 seen = vec3(0.0);
+    float all = 0.0;
+    for (uint i = 0; i < LOBE_RAYS && loop_iterations < LOOP_BUDGET; i++) {
+        uint index = trace_terms.sample_index * LOBE_RAYS + i;
+        vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
+        vec3 r = reflect_ray(-s.v, h).R;
+        float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
+        seen += weight * visibility_of_environment(s, r, weight > 0.0);
+        all += weight;
+    }
+    return all > 0.0 ? seen / all : vec3(1.0);
 }
 
 // Irradiance of a surface and of what occludes it, in this order or the other: of each the irradiance that arrives, `here`
@@ -120,8 +106,8 @@ vec3 occluded_environment_light(Surface s) {
     // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
     precise vec3 diffuse = scattered_radiance(s, albedo.base, vec3(1.0)) * PI;
     precise vec3 all = diffuse + albedo.base.base;
-    Seen seen = seen_of_environment(s);
-    precise vec3 here = environment_irradiance(s.n) * seen.irradiance;
+    VisibleIrradiance seen = visible_irradiance(s);
+    precise vec3 here = environment_irradiance(s.n) * seen.share;
     // What occludes faces this surface, and is taken to be as open.
     float size2 = dot(seen.occluded_direction, seen.occluded_direction);
     precise vec3 there = environment_irradiance(size2 > 0.0 ? -seen.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - seen.occluded_share);
@@ -135,8 +121,15 @@ vec3 occluded_environment_light(Surface s) {
     if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
     if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
     if (REFLECTION && LOBE_RAYS > 0) {
-        if (!s.base_traced) mirrored = partly_occluded(mirrored, beside, seen.base_lobe);
-        if (CLEARCOAT && !s.coat_traced) coat_mirrored = partly_occluded(coat_mirrored, beside, seen.coat_lobe);
+        // First the base, then the coat, in a loop: the code that traces lobes exists once.
+        for (uint i = 0; i < (CLEARCOAT ? 2u : 1u); i++) {
+            bool coat = CLEARCOAT && i == 1;
+            if (coat ? !s.coat_traced : !s.base_traced) {
+                vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
+                if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
+                else mirrored = partly_occluded(mirrored, beside, visible);
+            }
+        }
     }
     return environment_light_of(s, albedo, irradiance, mirrored, coat_mirrored);
 }

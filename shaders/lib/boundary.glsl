@@ -74,9 +74,9 @@ Boundary boundary_at(HitSurface hit, uvec4 media, vec3 direction) {
     return r;
 }
 
-// The layers of a surface that a ray hits. The base is a delta lobe for a roughness up to MIN_ROUGHNESS, and between media
-// of equal index, where nothing is refracted or scattered.
-Layers layers_at(HitSurface hit, Boundary boundary) {
+// The layers of a surface that a ray hits, for light that passes straight on: without energy compensation. The base is a delta lobe for a
+// roughness up to MIN_ROUGHNESS, and between media of equal index, where nothing is refracted or scattered.
+Layers passing_layers_at(HitSurface hit, Boundary boundary) {
     Layers b;
     b.s = hit.s;
     keep_diffuse(b.s, 1.0 - hit.transmits);
@@ -88,21 +88,15 @@ Layers layers_at(HitSurface hit, Boundary boundary) {
     if (TRANSMISSIVE && !boundary.solid) seen_from(b.s, b.n1);
     b.delta = !ROUGH || (b.s.roughness <= MIN_ROUGHNESS && !is_anisotropic(b.s)) || (b.solid && b.n1 == b.n2);
     b.coat_delta = !ROUGH || b.s.clearcoat_roughness <= MIN_ROUGHNESS;
-    if (!b.delta) compensate(b.s);
     b.cos_v = max(cosine(b.s.n, b.s.v), 1e-4);
     FacetFresnel f = fresnel_below_coat(b, b.cos_v);
     b.f_dielectric = f.dielectric;
     b.f_base = f.base;
     b.total = f.total;
     b.enters = 1.0 - largest(b.f_dielectric);
-    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(albedo_of_base(b.s, lobe_reflectance(b.s)));
     b.left = left_to_base(b.s);
     b.through_share = diffuse_through_share(b.s);
-    b.under = 1.0;
-    if (CLEARCOAT) {
-        b.under = under_coat(b.s);
-        if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.coat_delta) b.under = 1.0 - min(albedo_of_coat(b.s), 1.0);
-    }
+    b.under = left_under_coat(b.s, ROUGH && BRDF == BRDF_GGX_MULTI && !b.coat_delta);
     b.tint = vec3(0.0);
     b.transmits = 0.0;
     if (TRANSMISSIVE) {
@@ -110,6 +104,14 @@ Layers layers_at(HitSurface hit, Boundary boundary) {
         b.transmits = hit.transmits * (1.0 - hit.s.metallic);
     }
     b.shares = vec4(0.0);
+    return b;
+}
+
+// The same with the energy compensation of a rough base, and what that base leaves to the layer below.
+Layers layers_at(HitSurface hit, Boundary boundary) {
+    Layers b = passing_layers_at(hit, boundary);
+    if (!b.delta) compensate(b.s);
+    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(albedo_of_base(b.s));
     return b;
 }
 #endif

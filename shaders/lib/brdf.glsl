@@ -29,20 +29,26 @@ struct HalfAngle {
     float sum2;   // |L + V|²; 0 for L = −V, where H is undefined: then cos_h is 0 and sin2_h 1
 };
 
-// L + V without its component along L − V: the first two steps of half_angle, which all normals share.
+// The half vector before it meets a normal. All normals of a surface share it.
 struct DirectionSum {
-    vec3 hi;
-    vec3 lo;           // 0 unless compensated
-    DoubleFloat sum2;  // its square
-    HalfAngle alone;   // what does not depend on a normal
+    vec3 hi;           // H; 0 where it is undefined. Compensated: L + V without its component along L − V
+    vec3 lo;           // compensated: the rest of it; otherwise 0
+    DoubleFloat sum2;  // |L + V|², corrected as well
+    HalfAngle any_normal;  // what does not depend on a normal
 };
 
+// Derivation. S = L + V, D = L − V.
+// 1. Where L is near −V, S is exact but short. If rounding makes |L| and |V| differ by 1e-7, S has a component along D.
+// 2. For unit vectors S ⟂ D. So the component of S along D is removed: S − (L² − V²)/4 · D, since S·D = L² − V² and D² = 4.
+// 3. cosθ_h, sin²θ_h and cosθ_d follow from the corrected S (half_angle_to). 2(1 + L·V) would lose |L + V|² altogether
+//    (numerics.md 18).
+// Compensated: S and D are double-floats, and N × S and N·S are sums of exact products. Textbook: none of it.
 DirectionSum sum_of_directions(vec3 L, vec3 V) {
     DirectionSum r = DirectionSum(L + V, vec3(0.0), DoubleFloat(0.0, 0.0), HalfAngle(0.0, 1.0, 0.0, 0.0));
     if (ARITHMETIC == FAST) {
         vec3 H = normalize(r.hi);
-        r.alone.cos_d = dot(V, H);
-        r.alone.sum2 = 2.0 * (1.0 + dot(L, V));
+        r.any_normal.cos_d = dot(V, H);
+        r.any_normal.sum2 = 2.0 * (1.0 + dot(L, V));
         r.hi = H;
     } else if (ARITHMETIC == COMPENSATED) {
         // 1. S and D as double-floats.
@@ -65,8 +71,8 @@ DirectionSum sum_of_directions(vec3 L, vec3 V) {
         r.hi = T.hi;
         r.lo = T_lo;
         r.sum2 = quick_two_sum(t2.hi, t2_lo);
-        r.alone.sum2 = r.sum2.hi - r.sum2.hi * (0.5 * length_error);
-        r.alone.cos_d = min(0.5 * sqrt(r.alone.sum2), 1.0);
+        r.any_normal.sum2 = r.sum2.hi - r.sum2.hi * (0.5 * length_error);
+        r.any_normal.cos_d = min(0.5 * sqrt(r.any_normal.sum2), 1.0);
     } else {
         // The same steps in f32.
         vec3 D = L - V;
@@ -75,15 +81,15 @@ DirectionSum sum_of_directions(vec3 L, vec3 V) {
         bool defined = s2 >= SMALLEST_NORMAL;
         r.hi = defined ? S * inversesqrt(s2) : vec3(0.0);
         r.sum2.hi = s2;
-        r.alone.cos_d = defined ? min(0.5 * sqrt(s2), 1.0) : 0.0;
-        r.alone.sum2 = defined ? s2 : 0.0;
+        r.any_normal.cos_d = defined ? min(0.5 * sqrt(s2), 1.0) : 0.0;
+        r.any_normal.sum2 = defined ? s2 : 0.0;
     }
     return r;
 }
 
-// The third step of half_angle.
+// The third step of the derivation above.
 HalfAngle half_angle_to(vec3 N, DirectionSum sum) {
-    HalfAngle r = sum.alone;
+    HalfAngle r = sum.any_normal;
     if (ARITHMETIC == COMPENSATED) {
         DoubleFloat lengths = df_mul(sum.sum2, dot2(N, N));
         bool defined = lengths.hi >= SMALLEST_NORMAL;
@@ -102,11 +108,7 @@ HalfAngle half_angle_to(vec3 N, DirectionSum sum) {
 }
 
 // @eq B1 N9 N18 N19: H = (L + V)/|L + V|, cosθ_h = N·H, cosθ_d = V·H = |L + V|/2
-// Derivation. S = L + V, D = L − V.
-// 1. Where L is near −V, S is exact but short. If rounding makes |L| and |V| differ by 1e-7, S has a component along D.
-// 2. For unit vectors S ⟂ D. So the component of S along D is removed: S − (L² − V²)/4 · D, since S·D = L² − V² and D² = 4.
-// 3. cosθ_h, sin²θ_h and cosθ_d follow from the corrected S. 2(1 + L·V) would lose |L + V|² altogether (numerics.md 18).
-// Compensated: S and D are double-floats, and N × S and N·S are sums of exact products.
+// The steps: sum_of_directions and half_angle_to, which pictures call.
 // @lab half_angle_to: laboratory_forms_agree_with_the_functions_of_pictures
 HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
     return half_angle_to(N, sum_of_directions(L, V));

@@ -70,7 +70,7 @@ vec3 emission_at(uint triangle, float u, float v) {
     vec3 radiance = material_emissive(material);
     if ((HIT_TEXTURES & (1u << SLOT_EMISSIVE)) != 0) {
         HitPoint point = hit_point_of(Hit(0.0, triangle, u, v), vec3(0.0), vec3(0.0));
-        radiance *= hit_texture_or(material, SLOT_EMISSIVE, point.uvs, 0.0, vec4(1.0)).rgb;
+        radiance *= hit_texture_or_white(material, SLOT_EMISSIVE, point.uvs, 0.0).rgb;
     }
     if (SPECTRAL && (material_flags(material) & MATERIAL_EMISSIVE_RGB) != 0) radiance = light_of_rgb(radiance);
     return radiance;

@@ -86,9 +86,10 @@ bool has_hit_texture(uint material, uint slot) {
     return (HIT_TEXTURES & (1u << slot)) != 0 && material_words(material, texture_slot(material, slot).first).z != 0;
 }
 
-vec4 hit_texture_or(uint material, uint slot, vec4 uv_sets, float footprint, vec4 otherwise) {
-    if ((HIT_TEXTURES & (1u << slot)) == 0) return otherwise;
-    return has_hit_texture(material, slot) ? hit_texture(material, slot, uv_sets, footprint) : otherwise;
+// White where the material has no such texture.
+vec4 hit_texture_or_white(uint material, uint slot, vec4 uv_sets, float footprint) {
+    if ((HIT_TEXTURES & (1u << slot)) == 0) return vec4(1.0);
+    return has_hit_texture(material, slot) ? hit_texture(material, slot, uv_sets, footprint) : vec4(1.0);
 }
 
 // Position, frame and attributes of a hit.
@@ -176,7 +177,7 @@ float coverage_of(Material m, float texel_alpha) {
 // The alpha test: whether the hit is in a hole of a masked surface. A blended surface is hit however small its alpha.
 bool hit_is_hole(HitPoint point) {
     Material m = material_at(point.material);
-    vec4 texel = hit_texture_or(point.material, SLOT_BASE, point.uvs, 0.0, vec4(1.0));
+    vec4 texel = hit_texture_or_white(point.material, SLOT_BASE, point.uvs, 0.0);
     return coverage_of(m, point.color.a * texel.a) == 0.0 && (m.flags & MATERIAL_BLENDED) == 0;
 }
 
@@ -205,8 +206,20 @@ vec3 facing_normal(HitPoint point, vec3 direction) {
     return is_front(point.n, direction) ? point.n : -point.n;
 }
 
-// The surface seen along `direction` by a ray (cone) of diameter `width` at the hit.
-HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
+// Slots whose textures are read at a hit.
+const uint EVERY_SLOT = ~0u;
+// Of paths, which trace the visibility that occlusion textures approximate.
+const uint SCATTERING_SLOTS = ~(1u << SLOT_OCCLUSION);
+// Where a branch of a ray tree splits: another kernel lights the surface.
+const uint SPLITTING_SLOTS = SCATTERING_SLOTS & ~(1u << SLOT_EMISSIVE);
+// Of straight light, by the same layers as a path that passes undeflected.
+const uint PASSING_SLOTS = SPLITTING_SLOTS & ~(1u << SLOT_DIFFUSE_TRANSMISSION | 1u << SLOT_DIFFUSE_TRANSMISSION_COLOR);
+// Of transparent shadows, which count angles to the interpolated normal.
+const uint FILTERING_SLOTS = PASSING_SLOTS & ~(1u << SLOT_CLEARCOAT_NORMAL | 1u << SLOT_CLEARCOAT_ROUGHNESS | 1u << SLOT_ANISOTROPY |
+                                               (SHEEN ? 0u : 1u << SLOT_NORMAL));
+
+// The surface seen along `direction` by a ray (cone) of diameter `width` at the hit, from the textures of `slots`.
+HitSurface hit_surface(HitPoint point, vec3 direction, float width, uint slots) {
     HitSurface r;
     uint id = point.material;
     Material m = material_at(id);
@@ -215,13 +228,14 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     Texels t = texels_of_nothing(point.color);
     vec3 normal = vec3(0.0, 0.0, 1.0);
     vec3 coat_normal = normal;
-    if (HIT_TEXTURES != 0) {
-        // Texture by texture: the code that reads one stands once in a program.
-        for (uint left = HIT_TEXTURES; left != 0; left &= left - 1) {
-            uint slot = uint(findLSB(left));
+    uint wanted = HIT_TEXTURES & slots;
+    if (wanted != 0) {
+        // Texture by texture: the code that reads one stands once here, and not once for each slot.
+        for (uint unread = wanted; unread != 0; unread &= unread - 1) {
+            uint slot = uint(findLSB(unread));
             if (has_hit_texture(id, slot)) {
                 vec4 value = hit_texture(id, slot, point.uvs, footprint);
-                put_texel(t, HIT_TEXTURES, slot, value);
+                put_texel(t, wanted, slot, value);
                 if (slot == SLOT_NORMAL) normal = value.xyz * 2.0 - 1.0;
                 if (slot == SLOT_CLEARCOAT_NORMAL) coat_normal = value.xyz * 2.0 - 1.0;
             }
@@ -231,11 +245,11 @@ HitSurface hit_surface(HitPoint point, vec3 direction, float width) {
     r.thickness = point.scale * t.thickness;
     vec3 n = point.n_smooth;
     vec3 n_coat = n;
-    if ((HIT_TEXTURES & (1u << SLOT_NORMAL)) != 0) {
+    if ((wanted & (1u << SLOT_NORMAL)) != 0) {
         vec3 bent = bent_normal(point.n_smooth, point.t_smooth, vec3(normal.xy * m.normal_scale, normal.z));
         n = has_hit_texture(id, SLOT_NORMAL) ? bent : n;
     }
-    if ((HIT_TEXTURES & (1u << SLOT_CLEARCOAT_NORMAL)) != 0) {
+    if ((wanted & (1u << SLOT_CLEARCOAT_NORMAL)) != 0) {
         vec3 bent = bent_normal(point.n_smooth, point.t_smooth, coat_normal);
         n_coat = has_hit_texture(id, SLOT_CLEARCOAT_NORMAL) ? bent : n_coat;
     }

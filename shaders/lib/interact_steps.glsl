@@ -151,8 +151,8 @@ void write_light(LightSample light) {
 }
 
 // The surface that the last branch has met.
-HitSurface surface_met(Branch ray, Hit found, float cone) {
-    HitSurface hit = hit_surface(hit_point_of(found, ray.origin, ray.direction), ray.direction, cone * exp2(trace_terms.lod_bias));
+HitSurface surface_met(Branch ray, Hit found, float cone, uint slots) {
+    HitSurface hit = hit_surface(hit_point_of(found, ray.origin, ray.direction), ray.direction, cone * exp2(trace_terms.lod_bias), slots);
     hit.s.media = ray.media;
     return hit;
 }

@@ -203,8 +203,8 @@ struct BaseAlbedo {
     vec3 base;       // of the mixture with the metallic part, under the lobes of extensions
 };
 
-// `ab` is the table's texel for the base.
-BaseAlbedo albedo_of_base(Surface s, vec2 ab) {
+BaseAlbedo albedo_of_base(Surface s) {
+    vec2 ab = s.lobe;
     vec3 dielectric = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
     vec3 base = s.f0 * ab.x + s.f90 * ab.y;
     if (FRESNEL == FRESNEL_EXACT || IRIDESCENCE) {
@@ -216,10 +216,23 @@ BaseAlbedo albedo_of_base(Surface s, vec2 ab) {
     return BaseAlbedo(dielectric * s.compensation, base * s.compensation * left_to_base(s));
 }
 
+// `ab` is the table's texel for the coat, f its Fresnel reflectance at mean_cosine(ab).
+float albedo_of_coat(Surface s, vec2 ab, float f) {
+    return FRESNEL == FRESNEL_EXACT ? f * (ab.x + ab.y) : s.clearcoat * (COAT_F0 * ab.x + ab.y);
+}
+
 float albedo_of_coat(Surface s) {
     vec2 ab = reflectance_of_lobe(dot(s.n_coat, s.v), s.clearcoat_roughness);
-    if (FRESNEL == FRESNEL_EXACT) return fresnel_of_coat(s, mean_cosine(ab)) * (ab.x + ab.y);
-    return s.clearcoat * (COAT_F0 * ab.x + ab.y);
+    return albedo_of_coat(s, ab, fresnel_of_coat(s, mean_cosine(ab)));
+}
+
+// Energy left under the clear coat: by its directional albedo, or by its reflectance at the viewer's angle. Fresnel's formula stands
+// once.
+float left_under_coat(Surface s, bool by_albedo) {
+    if (!CLEARCOAT) return 1.0;
+    vec2 ab = reflectance_of_lobe(dot(s.n_coat, s.v), s.clearcoat_roughness);
+    float f = fresnel_of_coat(s, by_albedo ? mean_cosine(ab) : clamp(dot(s.n_coat, s.v), 0.0, 1.0));
+    return 1.0 - (by_albedo ? min(albedo_of_coat(s, ab, f), 1.0) : f);
 }
 
 // The table's texel for the base of a surface; of an anisotropic lobe the same factors by a sum.
@@ -253,12 +266,10 @@ vec3 scattered_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
     return scattered * irradiance;
 }
 
-// Energy compensation for single scattering, where the knob `brdf` is `ggx-multi`.
+// The base's lobe as a whole: its reflectance, and energy compensation for single scattering where the knob `brdf` is `ggx-multi`.
 void compensate(inout Surface s) {
-    if (BRDF == BRDF_GGX_MULTI) {
-        vec2 ab = lobe_reflectance(s);
-        s.compensation = ggx_compensation(s.f0, ab.x + ab.y);
-    }
+    s.lobe = lobe_reflectance(s);
+    if (BRDF == BRDF_GGX_MULTI) s.compensation = ggx_compensation(s.f0, s.lobe.x + s.lobe.y);
 }
 
 // --------------------------------------------------------------------------------------------------------------------
@@ -270,7 +281,7 @@ struct Layers {
     bool between;      // the media on both sides are known, as for a ray: solid, n1 and n2 hold
     bool solid;        // interface of a closed dielectric mesh
     float n1;          // index of the medium on the viewer's side
-    float n2;          // index behind the interface, or of the dielectric part
+    float n2;          // index behind the interface; unless solid, of the dielectric part
     bool sheet;        // thin-walled: transmits light and encloses no medium
     bool delta;        // the base reflects and refracts as a specular (delta) lobe
     bool coat_delta;
@@ -297,20 +308,18 @@ struct FacetFresnel {
 FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     Surface s = b.s;
     FacetFresnel f;
-    float n1 = b.between ? b.n1 : s.n_outside;
-    float n2 = b.between ? b.n2 : s.ior;
-    float share = b.between || FRESNEL == FRESNEL_EXACT ? boundary_share(cos_in, n1, n2) : schlick_weight(cos_in);
+    float share = b.between || FRESNEL == FRESNEL_EXACT ? boundary_share(cos_in, b.n1, b.n2) : schlick_weight(cos_in);
     float in_air = nested_f0(1.0, s.ior);
     vec3 f0 = s.f0_dielectric;
-    if (b.solid) f0 *= in_air > 0.0 ? nested_f0(n1, n2) / in_air : 0.0;
+    if (b.solid) f0 *= in_air > 0.0 ? nested_f0(b.n1, b.n2) / in_air : 0.0;
     f.total = b.solid && share >= 1.0;
     f.dielectric = f0 + (vec3(s.f90_dielectric) - f0) * share;
     vec3 metal = fresnel_of_metal(s, cos_in);
     if (IRIDESCENCE) {
-        Film film = film_of(s, cos_in, n1);
+        Film film = film_of(s, cos_in, b.n1);
         // Of a closed dielectric mesh f0_dielectric is that in air.
-        float r0 = b.solid ? in_air : nested_f0(n1, s.ior);
-        f.dielectric = under_film(s, film, f.dielectric, n2, r0);
+        float r0 = b.solid ? in_air : nested_f0(b.n1, s.ior);
+        f.dielectric = under_film(s, film, f.dielectric, b.n2, r0);
         metal = metal_under_film(s, film, metal);
     }
     f.dielectric = f.total ? vec3(1.0) : f.dielectric;
@@ -326,15 +335,15 @@ float diffuse_through_share(Surface s) {
     return DIFFUSE_TRANSMISSION && through > 0.0 ? through / (reflected + through) : 0.0;
 }
 
-// The directional albedos of a surface's layers.
+// The directional albedos of a compensated surface's layers.
 struct LayerAlbedo {
     BaseAlbedo base;
     float coat;       // 0 without a coat
-    float under_coat; // energy left under the coat; 1 without one
+    float under_coat; // energy left under the coat: by its albedo for `ggx-multi`, else at the viewer's angle; 1 without one
 };
 
 LayerAlbedo layer_albedo(Surface s) {
-    LayerAlbedo r = LayerAlbedo(albedo_of_base(s, lobe_reflectance(s)), 0.0, 1.0);
+    LayerAlbedo r = LayerAlbedo(albedo_of_base(s), 0.0, 1.0);
     if (CLEARCOAT) {
         r.coat = albedo_of_coat(s);
         r.under_coat = BRDF == BRDF_GGX_MULTI ? 1.0 - min(r.coat, 1.0) : under_coat(s);

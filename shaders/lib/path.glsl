@@ -88,8 +88,8 @@ vec3 shadow_ray_transmittance(ShadowRay shadow_ray) {
             if (hit_class(found.triangle) == OPAQUE) {
                 through = vec3(0.0);
             } else {
-                Interaction interaction = interaction_at(hit_point_of(found, shadow_ray.origin, shadow_ray.to_light), media, direction);
-                Layers b = layers_at(interaction.hit, interaction.boundary);
+                Interaction interaction = interaction_at(hit_point_of(found, shadow_ray.origin, shadow_ray.to_light), media, direction, PASSING_SLOTS);
+                Layers b = passing_layers_at(interaction.hit, interaction.boundary);
                 vec3 passes = is_straight(b) ? straight_transmittance(b) : vec3(0.0);
                 through *= interaction.boundary.suppressed_by_priority ? vec3(1.0) : 1.0 - interaction.hit.coverage + interaction.hit.coverage * passes;
                 bool enters = interaction.boundary.solid && (interaction.boundary.suppressed_by_priority || interaction.hit.coverage > 0.0);
@@ -196,7 +196,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
 
     // 3b. Light found by the path itself: emission of the surface, weighted by the power heuristic.
     if (at_surface && !passed_by) {
-        vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * (CLEARCOAT ? under_coat(hit.s) : 1.0);
+        vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * under_coat(hit.s);
         // Single-sided surfaces emit on their front alone.
         bool shows = EMISSIVE_LIGHTS || (p.state & PATH_NON_SPECULAR) == 0;
         shows = shows && (hit.s.unlit || hit.front || (hit_material(vertex.leaf) & ONE_SIDED_TRIANGLE) == 0);

@@ -11,9 +11,9 @@ struct Interaction {
     Boundary boundary;
 };
 
-Interaction interaction_at(HitPoint point, uvec4 media, vec3 direction) {
+Interaction interaction_at(HitPoint point, uvec4 media, vec3 direction, uint slots) {
     Interaction r;
-    r.hit = hit_surface(point, direction, 0.0);
+    r.hit = hit_surface(point, direction, 0.0, slots);
     r.hit.s.media = media;
     r.boundary = boundary_at(r.hit, media, direction);
     return r;
@@ -37,7 +37,7 @@ PathVertex path_vertex_at(inout Path p, Hit found, uint word) {
     if (ABSORPTION == ABSORPTION_PATH && medium != 0) p.throughput *= absorbed(medium, p.origin, p.direction, r.at_surface ? found.t : 0.0);
     r.leaf = r.at_surface ? found.triangle : 0u;
     HitPoint point = hit_point_of(Hit(found.t, r.leaf, found.u, found.v), p.origin, p.direction);
-    r.interaction = interaction_at(point, p.media, p.direction);
+    r.interaction = interaction_at(point, p.media, p.direction, SCATTERING_SLOTS);
     HitSurface hit = r.interaction.hit;
     r.bsdf = bsdf_at(hit, r.interaction.boundary);
     float x = unit_float(word);

@@ -57,7 +57,7 @@ vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
 
 // Transmittance of one surface for light along `direction`; updates the list of media.
 vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
-    HitSurface hit = hit_surface(point, direction, 0.0);
+    HitSurface hit = hit_surface(point, direction, 0.0, FILTERING_SLOTS);
     float cos_v = abs(dot(point.n_smooth, direction));
     uvec4 after = media;
     float n1 = 1.0;

@@ -49,6 +49,7 @@ struct Surface {
     float ior;           // of the dielectric part
     float n_outside;     // index of the medium on the viewer's side
     vec3 compensation;   // energy compensation of single scattering: 1 but for `ggx-multi`
+    vec2 lobe;           // factors of F0 and F90 in the directional albedo of the base's lobe, once compensated
     float alpha;         // roughness²; with anisotropy α across `tangent`
     float alpha_along;   // α along `tangent`: `alpha` without anisotropy
     vec3 tangent;        // unit direction of anisotropy, perpendicular to n
@@ -140,6 +141,7 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     s.ior = m.ior;
     s.n_outside = 1.0;
     s.compensation = vec3(1.0);
+    s.lobe = vec2(0.0);
     s.roughness = max(t.roughness * m.roughness, MIN_ROUGHNESS);
     s.alpha = s.roughness * s.roughness;
     s.alpha_along = s.alpha;

@@ -59,6 +59,7 @@ SurfaceFragment surface_fragment() {
     READ(iridescence_thickness_page, SLOT_IRIDESCENCE_THICKNESS)
     READ(diffuse_transmission_page, SLOT_DIFFUSE_TRANSMISSION)
     READ(diffuse_transmission_color_page, SLOT_DIFFUSE_TRANSMISSION_COLOR)
+#undef READ
 
     // The geometric normal from positions of neighbouring fragments: they lie in the plane of the triangle.
     vec3 face = cross(dFdx(p_rel), dFdy(p_rel));
@@ -76,7 +77,9 @@ SurfaceFragment surface_fragment() {
         s.n_shading = bent_normal(n, t_rel, vec3(texel.xy * material_at(ids.y).normal_scale, texel.z));
     }
     if (HAS_COAT_NORMAL) s.n_coat = bent_normal(n, t_rel, page_texel(clearcoat_normal_page, SLOT_CLEARCOAT_NORMAL).xyz * 2.0 - 1.0);
-    if (ANISOTROPIC) {
+    if (!ANISOTROPIC) {
+        s.texels.tangent = vec3(1.0, 0.0, 0.0);
+    } else {
         vec2 rotation = material_texel(ids.y, MATERIAL_LOBES_AT + int(LOBE_ANISOTROPY)).yz;
         s.texels.tangent = anisotropy_direction(s.n_shading, t_rel, s.texels.tangent.xy, rotation);
     }

@@ -50,7 +50,7 @@ struct Texels {
     vec4 sheen; // colour, roughness
     vec3 specular_color;
     float anisotropy;          // strength
-    vec3 tangent;              // unit direction along which the base's lobe is wide, world axes; as a texel in the frame of tangents
+    vec3 tangent;              // unit direction along which the base's lobe is wide, world axes; while textures are read, the texel's two components
     vec2 iridescence;          // factor, thickness
     vec4 diffuse_transmission; // colour, factor
 };
@@ -60,8 +60,8 @@ Texels texels_of_nothing(vec4 vertex_color) {
                   vec4(1.0));
 }
 
-// Puts the value of the texture in `slot` where it belongs; `used` has the bits of all slots that some material uses.
-// Normal maps are put by the callers, which have the frames for them.
+// Puts the value of the texture in `slot` where it belongs; `used` has the bits of all slots that the caller reads. Callers keep
+// normal maps themselves: they have the frames for them.
 #define PUT(name) if ((used & (1u << name)) != 0 && slot == name)
 void put_texel(inout Texels t, uint used, uint slot, vec4 value) {
     PUT(SLOT_BASE) t.base *= value;

@@ -111,7 +111,7 @@ void main() {
             // 3. Light the hit and split the branch there, or look up the environment.
             if (at_surface) {
                 float cone = ray.width + ray.spread * found.t;
-                hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias));
+                hit = hit_surface(point, ray.direction, cone * exp2(trace_terms.lod_bias), EVERY_SLOT);
                 hit.s.media = ray.media;
                 boundary = boundary_at(hit, ray.media, ray.direction);
                 Surface s = surface_for_lights(hit, boundary, found.triangle);

@@ -15,7 +15,7 @@ void main() {
         waiting = known.y;
         Branch ray = last_branch();
         Hit found = tree_hit();
-        HitSurface hit = surface_met(ray, found, ray.width + ray.spread * found.t);
+        HitSurface hit = surface_met(ray, found, ray.width + ray.spread * found.t, EVERY_SLOT);
         Boundary boundary = boundary_at(hit, ray.media, ray.direction);
         if (!boundary.suppressed_by_priority) {
             Surface s = surface_for_lights(hit, boundary, found.triangle);

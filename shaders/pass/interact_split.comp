@@ -18,7 +18,7 @@ void main() {
         if (FIRST_EVENT != 0) first_event = ray.events >> 10;
         Hit found = tree_hit();
         float cone = ray.width + ray.spread * found.t;
-        HitSurface hit = surface_met(ray, found, cone);
+        HitSurface hit = surface_met(ray, found, cone, SPLITTING_SLOTS);
         Boundary boundary = boundary_at(hit, ray.media, ray.direction);
         waiting--;
         read_around();
