@@ -102,10 +102,10 @@ vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
 }
 
 vec3 occluded_environment_light(Surface s) {
-    LayerAlbedo albedo = layer_albedo(s);
+    BaseAlbedo albedo = albedo_of_base(s);
     // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
-    precise vec3 diffuse = scattered_radiance(s, albedo.base, vec3(1.0)) * PI;
-    precise vec3 all = diffuse + albedo.base.base;
+    precise vec3 diffuse = scattered_radiance(s, albedo, vec3(1.0)) * PI;
+    precise vec3 all = diffuse + albedo.base;
     VisibleIrradiance seen = visible_irradiance(s);
     precise vec3 here = environment_irradiance(s.n) * seen.share;
     // What occludes faces this surface, and is taken to be as open.
@@ -131,6 +131,6 @@ vec3 occluded_environment_light(Surface s) {
             }
         }
     }
-    return environment_light_of(s, albedo, irradiance, mirrored, coat_mirrored);
+    return environment_light_of(s, layer_albedo(s, albedo), irradiance, mirrored, coat_mirrored);
 }
 #endif

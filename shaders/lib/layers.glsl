@@ -342,8 +342,8 @@ struct LayerAlbedo {
     float under_coat; // energy left under the coat: by its albedo for `ggx-multi`, else at the viewer's angle; 1 without one
 };
 
-LayerAlbedo layer_albedo(Surface s) {
-    LayerAlbedo r = LayerAlbedo(albedo_of_base(s), 0.0, 1.0);
+LayerAlbedo layer_albedo(Surface s, BaseAlbedo base) {
+    LayerAlbedo r = LayerAlbedo(base, 0.0, 1.0);
     if (CLEARCOAT) {
         r.coat = albedo_of_coat(s);
         r.under_coat = BRDF == BRDF_GGX_MULTI ? 1.0 - min(r.coat, 1.0) : under_coat(s);

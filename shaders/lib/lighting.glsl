@@ -155,10 +155,11 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
 // environment.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, LightRange range, bool all_around) {
-    LayerAlbedo albedo = layer_albedo(s);
-    vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
+    LayerAlbedo albedo = layer_albedo(s, albedo_of_base(s));
+    // Before the lights: afterwards the albedos would take registers while shadow rays are traced.
     vec3 around = s.emissive * under_coat(s);
     if (AMBIENT || REFLECTION) around += environment_light(s, albedo);
+    vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
     result += all_around ? around : vec3(0.0);
     return s.unlit ? all_around ? s.base : vec3(0.0) : result;
 }

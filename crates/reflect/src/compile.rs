@@ -7,6 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use rspirv::dr::Module;
+
 use super::cache::{Cache, Key};
 use super::compact::compacted;
 use super::files::Result;
@@ -63,6 +65,22 @@ pub(crate) struct Recipe {
 const SAMPLE: &str = "#version 460\nlayout(binding = 0) buffer B { float x[]; };\n\
     void main() { float s = 0.0; for (int i = 0; i < 4; i++) { s += x[i] * 2.0; } x[0] = s; }";
 
+/// Reads the files of a program: the stage of each, its path and its text.
+fn read(paths: &[PathBuf]) -> Result<(Vec<shaderc::ShaderKind>, Vec<(String, String)>)> {
+    let mut texts = Vec::new();
+    for path in paths {
+        let text = fs::read_to_string(path).map_err(|e| format!("reading {}: {e}", path.display()))?;
+        texts.push((path.display().to_string(), text));
+    }
+    let kind = |path: &PathBuf| match path.extension().and_then(|e| e.to_str()) {
+        Some("vert") => Ok(shaderc::ShaderKind::Vertex),
+        Some("frag") => Ok(shaderc::ShaderKind::Fragment),
+        Some("comp") => Ok(shaderc::ShaderKind::Compute),
+        _ => Err(format!("{}: expected .vert, .frag or .comp", path.display())),
+    };
+    Ok((paths.iter().map(kind).collect::<Result<_>>()?, texts))
+}
+
 impl Recipe {
     pub(crate) fn new(root: &Path, without: Vec<String>, cache: Cache) -> Result<Self> {
         let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
@@ -81,19 +99,31 @@ impl Recipe {
 
     /// Compiles the files of a program; its stages share their bindings.
     pub(crate) fn program(&self, paths: &[PathBuf]) -> Result<Program> {
-        let mut texts = Vec::new();
-        for path in paths {
-            let text = fs::read_to_string(path).map_err(|e| format!("reading {}: {e}", path.display()))?;
-            texts.push((path.display().to_string(), text));
-        }
-        let kind = |path: &PathBuf| match path.extension().and_then(|e| e.to_str()) {
-            Some("vert") => Ok(shaderc::ShaderKind::Vertex),
-            Some("frag") => Ok(shaderc::ShaderKind::Fragment),
-            Some("comp") => Ok(shaderc::ShaderKind::Compute),
-            _ => Err(format!("{}: expected .vert, .frag or .comp", path.display())),
-        };
-        let kinds = paths.iter().map(kind).collect::<Result<Vec<_>>>()?;
+        let (kinds, texts) = read(paths)?;
         self.compile(&kinds, &texts)
+    }
+
+    /// The files of a program as unoptimised modules.
+    pub(crate) fn plain_program(&self, paths: &[PathBuf]) -> Result<Vec<Module>> {
+        let (kinds, texts) = read(paths)?;
+        let slots = self.interface.pass_slots(&texts)?;
+        let stages = kinds.iter().zip(&texts);
+        stages.map(|(&kind, (name, text))| self.plain(kind, name, text, &slots, &RefCell::new(Key::new()))).collect()
+    }
+
+    /// The module that is reflected. rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the declarations are the
+    /// same in 1.5.
+    fn plain(
+        &self,
+        kind: shaderc::ShaderKind,
+        name: &str,
+        text: &str,
+        slots: &PassSlots,
+        read: &RefCell<Key>,
+    ) -> Result<Module> {
+        let zero = shaderc::OptimizationLevel::Zero;
+        let words = self.words(kind, name, text, slots, zero, shaderc::SpirvVersion::V1_5, &[], read)?;
+        rspirv::dr::load_words(words).map_err(|e| format!("{name}: reflection: {e:?}"))
     }
 
     /// Compiles a source text under a name.
@@ -104,11 +134,9 @@ impl Recipe {
     fn compile(&self, kinds: &[shaderc::ShaderKind], texts: &[(String, String)]) -> Result<Program> {
         let slots = self.interface.pass_slots(texts)?;
         let stage = |(&kind, (name, text)): (&shaderc::ShaderKind, &(String, String))| -> Result<Stage> {
-            // rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the declarations are the same in 1.5.
-            let (zero, level) = (shaderc::OptimizationLevel::Zero, shaderc::OptimizationLevel::Performance);
+            let level = shaderc::OptimizationLevel::Performance;
             let read = RefCell::new(Key::new());
-            let plain = self.words(kind, name, text, &slots, zero, shaderc::SpirvVersion::V1_5, &[], &read)?;
-            let module = rspirv::dr::load_words(plain).map_err(|e| format!("{name}: reflection: {e:?}"))?;
+            let module = self.plain(kind, name, text, &slots, &read)?;
             let version = shaderc::SpirvVersion::V1_6;
             // What the compiler has just read, and all else that decides the code.
             let mut key = read.into_inner();

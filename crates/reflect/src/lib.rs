@@ -20,6 +20,7 @@ mod contract;
 mod equations;
 mod files;
 mod generate;
+mod inlined;
 mod interface;
 mod reflect;
 
@@ -30,6 +31,7 @@ use std::path::{Path, PathBuf};
 use cache::Cache;
 use compile::Recipe;
 use files::{Result, files, stem};
+pub use inlined::{Share, in_all};
 
 /// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs` and `share.rs` into `out_dir`. Code
 /// guarded by the specialization constants `without` is removed.
@@ -42,15 +44,8 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
     if let Some(name) = without.iter().find(|name| recipe.interface.owner("constant", name).is_none()) {
         return Err(format!("no shader has a constant {name}"));
     }
-    let mut sources: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
-    for path in files(&shaders.join("pass"))? {
-        sources.entry(stem(&path)).or_default().push(path);
-    }
-    if sources.is_empty() {
-        return Err(format!("{}: there are no shaders", shaders.join("pass").display()));
-    }
     let programs = compile::on_all_cores(
-        sources,
+        programs(shaders)?,
         || Recipe::new(shaders, without.to_vec(), cache.clone()),
         |recipe, paths| {
             let program = recipe.program(&paths)?;
@@ -67,6 +62,19 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
         |name: &str, text: String| fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"));
     write("shaders.rs", code)?;
     write("share.rs", generate::share(&recipe, &programs)?)
+}
+
+/// What becomes of each program when every call is inlined: its functions, the entry point first.
+///
+/// # Errors
+/// The errors of [`build`].
+pub fn inlined(shaders: &Path) -> Result<BTreeMap<String, Vec<Share>>, String> {
+    let recipe = Recipe::new(shaders, Vec::new(), Cache::default())?;
+    let shares = |(name, paths): (String, Vec<PathBuf>)| {
+        let modules = recipe.plain_program(&paths)?;
+        Ok((name, modules.iter().flat_map(inlined::shares).collect()))
+    };
+    programs(shaders)?.into_iter().map(shares).collect()
 }
 
 /// A binding of a program: set, name, slot, and kind and access in the names of the generated Rust.
@@ -114,6 +122,18 @@ pub fn parts(shaders: &Path, name: &str) -> Result<BTreeSet<PathBuf>, String> {
     let mut parts = BTreeSet::new();
     sources(shaders, name)?.into_iter().for_each(|path| include(shaders, path, &mut parts));
     Ok(parts)
+}
+
+/// The stage files of every program under `shaders`.
+fn programs(shaders: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
+    let mut programs: BTreeMap<String, Vec<PathBuf>> = BTreeMap::new();
+    for path in files(&shaders.join("pass"))? {
+        programs.entry(stem(&path)).or_default().push(path);
+    }
+    if programs.is_empty() {
+        return Err(format!("{}: there are no shaders", shaders.join("pass").display()));
+    }
+    Ok(programs)
 }
 
 /// Stage files of a program, in the order of the stages.
