@@ -65,8 +65,11 @@ pub(crate) struct Recipe {
 const SAMPLE: &str = "#version 460\nlayout(binding = 0) buffer B { float x[]; };\n\
     void main() { float s = 0.0; for (int i = 0; i < 4; i++) { s += x[i] * 2.0; } x[0] = s; }";
 
+/// Path and text of each file.
+type Texts = Vec<(String, String)>;
+
 /// Reads the files of a program: the stage of each, its path and its text.
-fn read(paths: &[PathBuf]) -> Result<(Vec<shaderc::ShaderKind>, Vec<(String, String)>)> {
+fn read(paths: &[PathBuf]) -> Result<(Vec<shaderc::ShaderKind>, Texts)> {
     let mut texts = Vec::new();
     for path in paths {
         let text = fs::read_to_string(path).map_err(|e| format!("reading {}: {e}", path.display()))?;
