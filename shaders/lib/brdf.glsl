@@ -40,7 +40,7 @@ struct DirectionSum {
 // Derivation. S = L + V, D = L − V.
 // 1. Where L is near −V, S is exact but short. If rounding makes |L| and |V| differ by 1e-7, S has a component along D.
 // 2. For unit vectors S ⟂ D. So the component of S along D is removed: S − (L² − V²)/4 · D, since S·D = L² − V² and D² = 4.
-// 3. cosθ_h, sin²θ_h and cosθ_d follow from the corrected S (half_angle_to). 2(1 + L·V) would lose |L + V|² altogether
+// 3. cosθ_h, sin²θ_h and cosθ_d follow from the corrected S (half_angle of a sum). 2(1 + L·V) would lose |L + V|² altogether
 //    (numerics.md 18).
 // Compensated: S and D are double-floats, and N × S and N·S are sums of exact products. Textbook: none of it.
 DirectionSum sum_of_directions(vec3 L, vec3 V) {
@@ -88,7 +88,7 @@ DirectionSum sum_of_directions(vec3 L, vec3 V) {
 }
 
 // The third step of the derivation above.
-HalfAngle half_angle_to(vec3 N, DirectionSum sum) {
+HalfAngle half_angle(vec3 N, DirectionSum sum) {
     HalfAngle r = sum.any_normal;
     if (ARITHMETIC == COMPENSATED) {
         DoubleFloat lengths = df_mul(sum.sum2, dot2(N, N));
@@ -108,10 +108,9 @@ HalfAngle half_angle_to(vec3 N, DirectionSum sum) {
 }
 
 // @eq B1 N9 N18 N19: H = (L + V)/|L + V|, cosθ_h = N·H, cosθ_d = V·H = |L + V|/2
-// The steps: sum_of_directions and half_angle_to, which pictures call.
-// @lab half_angle_to: laboratory_forms_agree_with_the_functions_of_pictures
+// The steps: sum_of_directions and half_angle of a sum, which pictures call.
 HalfAngle half_angle(vec3 N, vec3 L, vec3 V) {
-    return half_angle_to(N, sum_of_directions(L, V));
+    return half_angle(N, sum_of_directions(L, V));
 }
 
 // The same angle `r` for a lobe that may be wide. For a shininess of 1 the lobe is the cosine itself, and near 90° a plain sum

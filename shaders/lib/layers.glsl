@@ -442,7 +442,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         float enters = b.enters;
         vec3 lobe = vec3(0.0);       // the part of the BRDF that is multiplied by cosθ_l
         vec3 lobe_alone = vec3(0.0); // the part that is not
-        HalfAngle h = half_angle_to(s.n, sum);
+        HalfAngle h = half_angle(s.n, sum);
         if (!b.delta) {
             if (phong) h = phong_half_angle(s.n, l, s.v, h);
             BaseLobe base = base_lobe(b, l, cos_l, h);
@@ -476,7 +476,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         if (b.coat_delta) {
             r.f_cos *= b.under;
         } else {
-            HalfAngle h = half_angle_to(s.n_coat, sum);
+            HalfAngle h = half_angle(s.n_coat, sum);
             float f = fresnel_of_coat(s, h.cos_d);
             float coat_l = max(cosine(s.n_coat, l), 0.0);
             float coat_v = max(cosine(s.n_coat, s.v), 1e-4);
