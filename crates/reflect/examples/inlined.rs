@@ -1,5 +1,5 @@
-//! What shaders become when every call is inlined: `cargo run -p etalon-reflect --example inlined`, or with the name of a program
-//! for its functions.
+//! What shaders become when every call is inlined: `cargo run -p etalon-reflect --example inlined`, or with the name of
+//! a program for its functions.
 
 use std::path::Path;
 use std::process::ExitCode;

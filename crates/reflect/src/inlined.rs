@@ -1,7 +1,7 @@
 //! What a program becomes when every call is inlined, as SPIR-V optimisers and drivers do.
 //!
-//! Read docs/decisions/shaderc.md, Few copies. Build scripts, validation and drivers take their time for these instructions,
-//! most of which one choice of specialization constants never runs.
+//! Read docs/decisions/shaderc.md, Few copies. Build scripts, validation and drivers take their time for these
+//! instructions, most of which one choice of specialization constants never runs.
 
 use std::collections::{BTreeMap, HashMap};
 
