@@ -15,7 +15,7 @@ use crate::reflect::{Names, word};
 pub struct Share {
     /// Name in the source.
     pub function: String,
-    /// Copies after inlining; loops and recursion are not multiplied.
+    /// Copies after inlining; the body of a loop counts once.
     pub copies: usize,
     /// Instructions of one copy, without those of its calls.
     pub own: usize,
@@ -75,11 +75,11 @@ fn size(
     sum
 }
 
-/// The shares of several modules together, by function: copies are added, and each module's own size counts.
+/// Functions of all stages together: name, copies, and instructions without those that they call; the largest first.
 #[must_use]
-pub fn in_all(programs: &BTreeMap<String, Vec<Share>>) -> Vec<(String, usize, usize)> {
+pub fn by_function(stages: &BTreeMap<String, Vec<Share>>) -> Vec<(String, usize, usize)> {
     let mut all: HashMap<&str, (usize, usize)> = HashMap::new();
-    for share in programs.values().flatten() {
+    for share in stages.values().flatten() {
         let (copies, instructions) = all.entry(&share.function).or_default();
         *copies += share.copies;
         *instructions += share.copies * share.own;

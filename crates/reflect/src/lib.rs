@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 use cache::Cache;
 use compile::Recipe;
 use files::{Result, files, stem};
-pub use inlined::{Share, in_all};
+pub use inlined::{Share, by_function};
 
 /// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs` and `share.rs` into `out_dir`. Code
 /// guarded by the specialization constants `without` is removed.
@@ -64,17 +64,21 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
     write("share.rs", generate::share(&recipe, &programs)?)
 }
 
-/// What becomes of each program when every call is inlined: its functions, the entry point first.
+/// What becomes of each stage when every call is inlined, by the name of its file: its functions, the entry point
+/// first.
 ///
 /// # Errors
 /// The errors of [`build`].
 pub fn inlined(shaders: &Path) -> Result<BTreeMap<String, Vec<Share>>, String> {
     let recipe = Recipe::new(shaders, Vec::new(), Cache::default())?;
-    let shares = |(name, paths): (String, Vec<PathBuf>)| {
-        let modules = recipe.plain_program(&paths)?;
-        Ok((name, modules.iter().flat_map(inlined::shares).collect()))
-    };
-    programs(shaders)?.into_iter().map(shares).collect()
+    let mut stages = BTreeMap::new();
+    for paths in programs(shaders)?.into_values() {
+        for (path, module) in paths.iter().zip(recipe.plain_program(&paths)?) {
+            let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+            stages.insert(name, inlined::shares(&module));
+        }
+    }
+    Ok(stages)
 }
 
 /// A binding of a program: set, name, slot, and kind and access in the names of the generated Rust.
