@@ -101,36 +101,40 @@ vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
     return sum;
 }
 
+// All that needs the layers is evaluated before rays are traced, and light is summed as soon as it is known: what is kept until later
+// takes registers from the rays.
 vec3 occluded_environment_light(Surface s) {
-    BaseAlbedo albedo = albedo_of_base(s);
+    LayerAlbedo albedo = layer_albedo(s, albedo_of_base(s));
+    EnvironmentFactors factors = environment_factors(s, albedo);
     // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
-    precise vec3 diffuse = scattered_radiance(s, albedo, vec3(1.0)) * PI;
-    precise vec3 all = diffuse + albedo.base;
+    precise vec3 diffuse = scattered_radiance(s, albedo.base, vec3(1.0)) * PI;
+    precise vec3 all = diffuse + albedo.base.base;
+    precise vec3 kept = min(all, 0.98);
+    vec3 mirrored = vec3(0.0);
+    vec3 coat_mirrored = vec3(0.0);
+    if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = radiance_in_coat_lobe(s);
     VisibleIrradiance seen = visible_irradiance(s);
     precise vec3 here = environment_irradiance(s.n) * seen.share;
     // What occludes faces this surface, and is taken to be as open.
     float size2 = dot(seen.occluded_direction, seen.occluded_direction);
     precise vec3 there = environment_irradiance(size2 > 0.0 ? -seen.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - seen.occluded_share);
-    precise vec3 kept = min(all, 0.98);
     precise vec3 given_back = kept * seen.occluded_share;
-    vec3 irradiance = exchanged_irradiance(here, there, given_back);
+    vec3 result = diffuse_environment_light(factors, exchanged_irradiance(here, there, given_back));
+    if (!REFLECTION) return result;
     // The radiance of what occludes.
     precise vec3 beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;
-    vec3 mirrored = vec3(0.0);
-    vec3 coat_mirrored = vec3(0.0);
-    if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
-    if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
-    if (REFLECTION && LOBE_RAYS > 0) {
-        // First the base, then the coat, in a loop: the code that traces lobes exists once.
-        for (uint i = 0; i < (CLEARCOAT ? 2u : 1u); i++) {
-            bool coat = CLEARCOAT && i == 1;
-            if (coat ? !s.coat_traced : !s.base_traced) {
-                vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
-                if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
-                else mirrored = partly_occluded(mirrored, beside, visible);
-            }
+    // First the base, then the coat, in a loop: the code that traces lobes exists once.
+    for (uint i = 0; LOBE_RAYS > 0 && i < (CLEARCOAT ? 2u : 1u); i++) {
+        bool coat = CLEARCOAT && i == 1;
+        if (coat ? !s.coat_traced : !s.base_traced) {
+            vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
+            if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
+            else mirrored = partly_occluded(mirrored, beside, visible);
         }
     }
-    return environment_light_of(s, layer_albedo(s, albedo), irradiance, mirrored, coat_mirrored);
+    result += factors.base_lobe * mirrored;
+    if (CLEARCOAT) result += factors.coat_lobe * coat_mirrored;
+    return result;
 }
 #endif

@@ -8,18 +8,34 @@
 layout(constant) const bool AMBIENT = false;        // ambient light: the environment's irradiance on diffuse surfaces
 layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular lobes
 
-// `mirrored` is the radiance that arrives in the lobe of the base, `coat_mirrored` in that of the coat.
-vec3 environment_light_of(Surface s, LayerAlbedo albedo, vec3 irradiance, vec3 mirrored, vec3 coat_mirrored) {
-    vec3 result = vec3(0.0);
-    if (AMBIENT) result += scattered_radiance(s, albedo.base, irradiance);
-    // What comes through from behind has no visibility, with ambient occlusion neither.
-    if (AMBIENT && DIFFUSE_TRANSMISSION) result += transmitted_radiance(s, albedo.base, environment_irradiance(-s.n));
-    if (REFLECTION && !s.base_traced) result += albedo.base.base * mirrored;
+// What the layers of a surface make of the environment's light: radiance to the eye per irradiance, and per radiance that arrives in a
+// lobe. Shadow rays are traced with these numbers in registers, instead of with all of a surface.
+struct EnvironmentFactors {
+    vec3 scattered;
+    vec3 base_lobe;
+    float coat_lobe;
+    vec3 through; // the radiance to the eye of light from behind, which has no visibility
+};
+
+EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
+    EnvironmentFactors f = EnvironmentFactors(vec3(0.0), vec3(0.0), 0.0, vec3(0.0));
+    float left = s.occlusion;
     if (CLEARCOAT) {
-        result *= albedo.under_coat;
-        if (REFLECTION && !s.coat_traced) result += albedo.coat * coat_mirrored;
+        left *= albedo.under_coat;
+        if (REFLECTION && !s.coat_traced) f.coat_lobe = albedo.coat * s.occlusion;
     }
-    return result * s.occlusion;
+    if (AMBIENT) f.scattered = scattered_radiance(s, albedo.base, vec3(1.0)) * left;
+    if (AMBIENT && DIFFUSE_TRANSMISSION) f.through = transmitted_radiance(s, albedo.base, environment_irradiance(-s.n)) * left;
+    if (REFLECTION && !s.base_traced) f.base_lobe = albedo.base.base * left;
+    return f;
+}
+
+// Light on the diffuse base layer and on the lobes of extensions.
+vec3 diffuse_environment_light(EnvironmentFactors f, vec3 irradiance) {
+    vec3 result = vec3(0.0);
+    if (AMBIENT) result += f.scattered * irradiance;
+    if (AMBIENT && DIFFUSE_TRANSMISSION) result += f.through;
+    return result;
 }
 
 // Narrow lobes that make up an anisotropic one.
@@ -47,16 +63,16 @@ vec3 radiance_in_base_lobe(Surface s) {
     return result;
 }
 
+vec3 radiance_in_coat_lobe(Surface s) {
+    return prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
+}
+
 // Without visibility: the irradiance, and the prefiltered map in the direction of reflection.
 vec3 environment_light(Surface s, LayerAlbedo albedo) {
-    vec3 irradiance = vec3(0.0);
-    vec3 mirrored = vec3(0.0);
-    vec3 coat_mirrored = vec3(0.0);
-    if (AMBIENT) irradiance = environment_irradiance(s.n);
-    if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
-    if (CLEARCOAT && REFLECTION && !s.coat_traced) {
-        coat_mirrored = prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
-    }
-    return environment_light_of(s, albedo, irradiance, mirrored, coat_mirrored);
+    EnvironmentFactors factors = environment_factors(s, albedo);
+    vec3 result = diffuse_environment_light(factors, AMBIENT ? environment_irradiance(s.n) : vec3(0.0));
+    if (REFLECTION && !s.base_traced) result += factors.base_lobe * radiance_in_base_lobe(s);
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) result += factors.coat_lobe * radiance_in_coat_lobe(s);
+    return result;
 }
 #endif
