@@ -104,12 +104,8 @@ vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
 // All that needs the layers is evaluated before rays are traced, and light is summed as soon as it is known: what is kept until later
 // takes registers from the rays.
 vec3 occluded_environment_light(Surface s) {
-    LayerAlbedo albedo = layer_albedo(s, albedo_of_base(s));
-    EnvironmentFactors factors = environment_factors(s, albedo);
-    // The albedo of diffuse reflection, by an irradiance of 1, and that of the lobes.
-    precise vec3 diffuse = scattered_radiance(s, albedo.base, vec3(1.0)) * PI;
-    precise vec3 all = diffuse + albedo.base.base;
-    precise vec3 kept = min(all, 0.98);
+    EnvironmentFactors factors = environment_factors(s, layer_albedo(s, albedo_of_base(s)));
+    precise vec3 kept = min(factors.albedo, 0.98);
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
     if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
@@ -124,13 +120,15 @@ vec3 occluded_environment_light(Surface s) {
     if (!REFLECTION) return result;
     // The radiance of what occludes.
     precise vec3 beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;
-    // First the base, then the coat, in a loop: the code that traces lobes exists once.
-    for (uint i = 0; LOBE_RAYS > 0 && i < (CLEARCOAT ? 2u : 1u); i++) {
-        bool coat = CLEARCOAT && i == 1;
-        if (coat ? !s.coat_traced : !s.base_traced) {
-            vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
-            if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
-            else mirrored = partly_occluded(mirrored, beside, visible);
+    if (LOBE_RAYS > 0) {
+        // First the base, then the coat, in a loop: the code that traces lobes exists once.
+        for (uint i = 0; i < (CLEARCOAT ? 2u : 1u); i++) {
+            bool coat = CLEARCOAT && i == 1;
+            if (coat ? !s.coat_traced : !s.base_traced) {
+                vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
+                if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
+                else mirrored = partly_occluded(mirrored, beside, visible);
+            }
         }
     }
     result += factors.base_lobe * mirrored;

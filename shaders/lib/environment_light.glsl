@@ -9,23 +9,28 @@ layout(constant) const bool AMBIENT = false;        // ambient light: the enviro
 layout(constant) const bool REFLECTION = false;     // the prefiltered environment in specular lobes
 
 // What the layers of a surface make of the environment's light: radiance to the eye per irradiance, and per radiance that arrives in a
-// lobe. Shadow rays are traced with these numbers in registers, instead of with all of a surface.
+// lobe.
 struct EnvironmentFactors {
     vec3 scattered;
     vec3 base_lobe;
     float coat_lobe;
     vec3 through; // the radiance to the eye of light from behind, which has no visibility
+    vec3 albedo;  // of all below the coat
 };
 
 EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
-    EnvironmentFactors f = EnvironmentFactors(vec3(0.0), vec3(0.0), 0.0, vec3(0.0));
+    vec3 scattered = scattered_per_irradiance(s, albedo.base);
+    // Precise for the sake of ambient occlusion (exchanged_irradiance).
+    precise vec3 diffuse = scattered * PI;
+    precise vec3 all = diffuse + albedo.base.base;
+    EnvironmentFactors f = EnvironmentFactors(vec3(0.0), vec3(0.0), 0.0, vec3(0.0), all);
     float left = s.occlusion;
     if (CLEARCOAT) {
         left *= albedo.under_coat;
         if (REFLECTION && !s.coat_traced) f.coat_lobe = albedo.coat * s.occlusion;
     }
-    if (AMBIENT) f.scattered = scattered_radiance(s, albedo.base, vec3(1.0)) * left;
-    if (AMBIENT && DIFFUSE_TRANSMISSION) f.through = transmitted_radiance(s, albedo.base, environment_irradiance(-s.n)) * left;
+    if (AMBIENT) f.scattered = scattered * left;
+    if (AMBIENT && DIFFUSE_TRANSMISSION) f.through = transmitted_per_irradiance(s, albedo.base) * environment_irradiance(-s.n) * left;
     if (REFLECTION && !s.base_traced) f.base_lobe = albedo.base.base * left;
     return f;
 }

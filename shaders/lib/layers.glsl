@@ -249,21 +249,21 @@ float ground_share(BaseAlbedo albedo) {
     return 1.0 - min(largest(albedo.dielectric), 1.0);
 }
 
-// Radiance that diffuse transmission sends for irradiance on the other side.
-vec3 transmitted_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
+// Radiance that diffuse transmission sends, per irradiance on the other side.
+vec3 transmitted_per_irradiance(Surface s, BaseAlbedo albedo) {
     vec3 scattered = s.diffuse_through * diffuse_brdf(ground_share(albedo));
     if (SHEEN) scattered *= left_by_sheen_of_all(s, max(cosine(s.n, s.v), 1e-4));
-    return scattered * irradiance;
+    return scattered;
 }
 
-// Radiance that the diffuse base layer and the lobes of extensions (sheen) send for irradiance from a uniform environment.
-vec3 scattered_radiance(Surface s, BaseAlbedo albedo, vec3 irradiance) {
+// Radiance that the diffuse base layer and the lobes of extensions (sheen) send, per irradiance from a uniform environment.
+vec3 scattered_per_irradiance(Surface s, BaseAlbedo albedo) {
     vec3 scattered = s.diffuse * diffuse_brdf(ground_share(albedo));
     if (SHEEN) {
         float cos_v = max(cosine(s.n, s.v), 1e-4);
         scattered = scattered * left_by_sheen_of_all(s, cos_v) + s.sheen.rgb * (sheen_albedo(s, cos_v).x * INV_PI);
     }
-    return scattered * irradiance;
+    return scattered;
 }
 
 // The base's lobe as a whole: its reflectance, and energy compensation for single scattering where the knob `brdf` is `ggx-multi`.
