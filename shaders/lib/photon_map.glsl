@@ -46,14 +46,22 @@ PhotonSample sample_photons(vec3 p, vec3 n, float x, bool wanted) {
     float sum = 0.0;
     uint end = wanted ? photon_node_at(0).next : 0u;
     uint at = 0;
-    // The last iteration assigns nothing: lavapipe may lose what a lane assigns in it (lib/trace.glsl).
-    bool goes_on;
+    // The last iterations assign nothing: lavapipe may lose what a lane assigns in them (lib/trace.glsl).
+    uint count;
     do {
-        goes_on = at < end && loop_iterations < LOOP_BUDGET;
-        PhotonNode node = photon_node_at(goes_on ? at : 0u);
-        bool inside = goes_on && all(greaterThanEqual(p, node.low)) && all(lessThanEqual(p, node.high));
-        uint count = inside ? node.photons & ((1u << PHOTON_COUNT_BITS) - 1u) : 0u;
-        uint first = node.photons >> PHOTON_COUNT_BITS;
+        // To the next leaf whose box holds the point: a subgroup visits photons together, not whenever one lane has a leaf
+        // (Aila and Laine 2009; docs/decisions/architectures.md).
+        count = 0;
+        uint first = 0;
+        bool searches;
+        do {
+            searches = count == 0 && at < end && loop_iterations < LOOP_BUDGET;
+            PhotonNode node = photon_node_at(searches ? at : 0u);
+            bool inside = searches && all(greaterThanEqual(p, node.low)) && all(lessThanEqual(p, node.high));
+            count = inside ? node.photons & ((1u << PHOTON_COUNT_BITS) - 1u) : count;
+            first = inside ? node.photons >> PHOTON_COUNT_BITS : first;
+            at = searches ? inside ? at + 1 : node.next : at;
+        } while (searches);
         for (uint i = 0; i < count; i++) {
             Photon photon = photon_at(first + i);
             vec3 now = irradiance_of(photon, p, n);
@@ -67,8 +75,7 @@ PhotonSample sample_photons(vec3 p, vec3 n, float x, bool wanted) {
             brought = taken ? now : brought;
             chosen_weight = taken ? weight : chosen_weight;
         }
-        at = goes_on ? inside ? at + 1 : node.next : at;
-    } while (goes_on);
+    } while (count > 0);
     return PhotonSample(chosen, brought * (sum / chosen_weight));
 }
 #endif
