@@ -5,7 +5,7 @@
 //! ```
 //!
 //! of each pair of files the first is judged. Counted are signs of errors and of times, what is said to be wasted,
-//! steps of the frontier, and how many intervals of errors cover what the second run found.
+//! steps of the frontier, and how many intervals of errors miss what the second run found.
 //!
 //! Of two folders the pictures of the first are judged by the reference of the second, which
 //! `--reference-samples N --seed S --shard 2/1000` draws alone; maps of errors in the first folder become those against
@@ -26,7 +26,7 @@ struct Count {
     statements: usize,
     wrong: Vec<String>,
     intervals: usize,
-    covered: usize,
+    missed: Vec<String>,
 }
 
 impl Count {
@@ -91,9 +91,12 @@ fn compare(a: &Table, b: &Table, measured: bool, count: &mut Count) {
     }
     for now in a.points.iter().filter(|point| point.name != REFERENCE) {
         let Some(truth) = point(b, &now.name).filter(|truth| truth.image == now.image) else { continue };
-        let (now, truth) = (now.errors.error, truth.errors.error);
+        let (found, truth) = (now.errors.error, truth.errors.error);
         count.intervals += 1;
-        count.covered += usize::from(now.low <= truth.high && truth.low <= now.high);
+        if found.low > truth.high || truth.low > found.high {
+            let [found, truth] = [found, truth].map(|x| format!("{:.4} ({:.4} to {:.4})", x.median, x.low, x.high));
+            count.missed.push(format!("{}: error {found} / {truth}", now.name));
+        }
     }
 }
 
@@ -128,28 +131,28 @@ fn main() -> Result<()> {
             true => (read(a)?, read(b)?),
             false => (read(&a.join("cost.json"))?, rejudged(a, b)?),
         };
-        let before = (all.statements, all.wrong.len(), all.intervals, all.covered);
+        let before = (all.statements, all.wrong.len(), all.intervals, all.missed.len());
         compare(&a, &b, measured, &mut all);
         println!(
-            "{}: {} statements, {} contradicted; {} of {} intervals cover; resolution {:.4} / {:.4}",
+            "{}: {} statements, {} contradicted; {} intervals, {} miss; resolution {:.4} / {:.4}",
             a.scene,
             all.statements - before.0,
             all.wrong.len() - before.1,
-            all.covered - before.3,
             all.intervals - before.2,
+            all.missed.len() - before.3,
             a.reference.resolution,
             b.reference.resolution
         );
     }
-    for wrong in &all.wrong {
-        println!("  {wrong}");
+    for line in all.wrong.iter().chain(&all.missed) {
+        println!("  {line}");
     }
     println!(
-        "{} statements, {} contradicted; {} of {} intervals cover",
+        "{} statements, {} contradicted; {} intervals, {} miss",
         all.statements,
         all.wrong.len(),
-        all.covered,
-        all.intervals
+        all.intervals,
+        all.missed.len()
     );
     Ok(())
 }

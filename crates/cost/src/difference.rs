@@ -256,6 +256,12 @@ impl ShownReference {
         Self { estimates, off: CAUTION * change * factor * factor / (1.0 - factor) }
     }
 
+    /// The same with another bias of at most `off`, as a root mean square over the picture.
+    #[must_use]
+    pub fn also_off(self, off: f64) -> Self {
+        Self { off: self.off + off, ..self }
+    }
+
     /// A picture that is taken as exact.
     #[must_use]
     pub fn exact(display: &Display) -> Self {

@@ -22,7 +22,7 @@ use etalon::image::halves::error_of_halves;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
 use etalon::image::{Aov, AovData, Picture, exr, file, png, tone};
-use etalon::plan::Knobs;
+use etalon::plan::{Knobs, Model};
 
 /// Numbers of bands of wavelengths of a reference, and its least samples before it gets more bands.
 pub(super) const BANDS: [u32; 3] = [32, 16, 8];
@@ -78,6 +78,8 @@ pub struct Pilot {
     pub plain_ms: f64,
     /// Estimated samples for the resolution [`RESOLVED`].
     pub wanted: u32,
+    /// How far the planned bands of wavelengths are off; see [`Reference::off_by_bands`].
+    pub off_by_bands: f64,
     /// Warnings for the report.
     pub warnings: Vec<String>,
 }
@@ -92,6 +94,7 @@ pub struct Refined {
     knobs: Knobs,
     /// PNG file of the only round; `None` for several rounds.
     png: Option<Vec<u8>>,
+    off_by_bands: f64,
 }
 
 /// The largest of 4096, 1024, 256, 64 and 16 samples that take at most `limit_ms`, else 4, the least number of samples
@@ -243,7 +246,8 @@ impl Pilot {
             let why = if by_wavelength && !has_time { short } else { same };
             let warnings = if called_for { vec![why.to_owned()] } else { Vec::new() };
             let knobs = rungs("rgb")?;
-            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted: wanted(&plain), warnings });
+            let wanted = wanted(&plain);
+            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted, off_by_bands: 0.0, warnings });
         };
         let each_ms = |bands: u32| more * seen.each_ms * f64::from(bands) / 8.0;
         let affordable = |bands: &u32| samples_within(each_ms(*bands), share * budget_ms) >= FEWEST_SAMPLES;
@@ -251,8 +255,30 @@ impl Pilot {
         // Each band has its own random numbers.
         let wanted = (wanted(&seen) * 8).div_ceil(bands).max(FEWEST_SAMPLES);
         let knobs = rungs(&format!("spectral:{bands}"))?;
-        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings: Vec::new() })
+        let off_by_bands = if bands == BANDS[0] { 0.0 } else { off_by_bands(bench, bands)? };
+        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, off_by_bands, warnings: Vec::new() })
     }
+}
+
+/// Root mean square difference in display values 0 to 1 between `bands` bands of wavelengths and the most, in pictures by
+/// rays with one sample, which have no noise.
+///
+/// # Errors
+/// When a picture cannot be drawn.
+pub fn off_by_bands(bench: &Bench<'_>, bands: u32) -> Result<f64> {
+    let rays = ["reflection=ray", "refraction=ray", "fresnel=exact", "samples=1"];
+    let shown_in = |bands: u32| -> Result<Shown> {
+        let mut knobs = Knobs::of(Model::Local);
+        for choice in rays.map(str::to_owned).iter().chain([&format!("colour=spectral:{bands}")]) {
+            knobs.set(choice)?;
+        }
+        let mut renderer = bench.renderer(&knobs, bench.settings.seed)?;
+        renderer.render(bench.camera, &mut |_| ())?;
+        Ok(shown(&bench.film(renderer.film()?), &bench.settings.view_transform()))
+    };
+    let [few, most] = [shown_in(bands)?, shown_in(BANDS[0])?];
+    let squares = few.as_flattened().iter().zip(most.as_flattened()).map(|(a, b)| f64::from(a - b).powi(2));
+    Ok((squares.sum::<f64>() / (3 * few.len().max(1)) as f64).sqrt())
 }
 
 /// Whether the difference of two pictures is significant.
@@ -265,6 +291,14 @@ fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
 }
 
 impl Refined {
+    /// The first round of a planned reference.
+    ///
+    /// # Errors
+    /// When the round cannot be drawn.
+    pub fn first(pilot: &Pilot, bench: &Bench<'_>, samples: u32, progress: &mut dyn FnMut(Progress)) -> Result<Self> {
+        Ok(Self { off_by_bands: pilot.off_by_bands, ..Self::round(None, bench, &pilot.knobs, samples, progress)? })
+    }
+
     /// Draws one more round of `samples` samples, after the rounds of `known`.
     ///
     /// # Errors
@@ -281,12 +315,12 @@ impl Refined {
         let (parts, png, gpu_ms) = draw(bench, &knobs, seed, progress)?;
         let round = Round { seed, samples, gpu_ms };
         Ok(match known {
-            None => Self { parts, rounds: vec![round], knobs, png: Some(png) },
+            None => Self { parts, rounds: vec![round], knobs, png: Some(png), off_by_bands: 0.0 },
             Some(known) => {
                 let samples = [known.samples(), samples];
                 let parts = known.parts.iter().zip(&parts).map(|(a, b)| joined(a, b, samples)).collect();
                 let rounds = [known.rounds, vec![round]].concat();
-                Self { parts, rounds, knobs: known.knobs, png: None }
+                Self { parts, rounds, png: None, ..known }
             }
         })
     }
@@ -337,7 +371,7 @@ impl Refined {
         let (film, half) = (all(&self.parts), half(&self.parts, 0));
         let display = self.png.as_ref().and_then(|png| png::decode_display(png).ok());
         let display = display.unwrap_or_else(|| display_of(&film, settings));
-        let shown = ShownReference::of(&self.parts, &settings.view_transform());
+        let shown = ShownReference::of(&self.parts, &settings.view_transform()).also_off(self.off_by_bands);
         Truth { film, half, shown, display }
     }
 
@@ -378,6 +412,7 @@ impl Refined {
             own_error: own.relmse.sqrt(),
             own_flip,
             resolution,
+            off_by_bands: self.off_by_bands,
             converged: resolution <= RESOLVED,
             rounds: self.rounds.clone(),
             command: format!("{command} --seed {} {} -o reference.png", self.rounds[0].seed, arguments(&samples)),
@@ -437,7 +472,8 @@ impl Refined {
         }
         let knobs = set(&knobs, "samples", &first.samples.to_string())?;
         let png = if reference.rounds.len() == 1 { Some(file::read(&folder.join("reference.png"))?) } else { None };
-        Ok(Some((Self { parts, rounds: reference.rounds.clone(), knobs, png }, reference)))
+        let (rounds, off_by_bands) = (reference.rounds.clone(), reference.off_by_bands);
+        Ok(Some((Self { parts, rounds, knobs, png, off_by_bands }, reference)))
     }
 }
 

@@ -171,8 +171,12 @@ impl Run<'_> {
             found.search.extend(tried);
         }
         if agenda.plain.colour != rungs.colour {
+            let off = match reference.off_by_bands {
+                0.0 => String::new(),
+                off => format!(", which leaves it off by up to {:.2} % of the range", 100.0 * off),
+            };
             found.warnings.push(format!(
-                "the reference has {} of at most {} bands of wavelengths; knobs other than colour are measured in RGB",
+                "the reference has {} of at most {} bands of wavelengths{off}; knobs other than colour are measured in RGB",
                 rungs.colour.bands(),
                 BANDS[0]
             ));
@@ -214,7 +218,7 @@ impl Run<'_> {
         // Round up to a rung: rungs are powers of four.
         let samples = if samples.trailing_zeros() % 2 == 1 { 2 * samples } else { samples };
         let left_s = |at: &Progress| f64::from(at.of - at.done) * pilot.each_ms / 1e3 + (1.0 - FIRST_SHARE) * budget_s;
-        let refined = Refined::round(None, &self.bench, &pilot.knobs, samples, &mut |at| {
+        let refined = Refined::first(pilot, &self.bench, samples, &mut |at| {
             let (done, of, left_s) = (at.done as usize, at.of as usize, left_s(&at));
             (listener.step)(Step { name: "reference", done, of, left_s });
         })?;

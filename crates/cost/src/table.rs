@@ -95,6 +95,10 @@ pub struct Reference {
     pub own_flip: f64,
     /// Resolution: least error of display values 0 to 1 that is significant.
     pub resolution: f64,
+    /// Root mean square, in display values 0 to 1, of what fewer bands of wavelengths than the most are off, measured
+    /// without paths; a part of `resolution` and of every interval.
+    #[serde(default)]
+    pub off_by_bands: f64,
     /// Whether `resolution` is at most [`RESOLVED`].
     pub converged: bool,
     /// Pictures with different random seeds, whose mean is the reference.
