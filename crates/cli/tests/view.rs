@@ -444,23 +444,30 @@ fn two_triangles(folder: &Path) -> PathBuf {
 #[track_caller]
 fn shows_beside_panels(viewer: &mut Viewer<'_>, folder: &Path) -> (String, Vec<[u8; 3]>) {
     std::thread::sleep(Duration::from_secs(1));
-    viewer.key(C, None);
-    let command = viewer.line();
-    let (size, expected) = drawn(folder, &command);
-    viewer.key(ESCAPE, None);
-    viewer.until(&format!("the picture of `{command}`"), |viewer| {
-        let (window, pixels) = viewer.pixels()?;
-        // It begins at the left, below the bar.
-        let rows = window[1].checked_sub(size[1])?;
-        let row = |y: u32, width: u32, of: &[[u8; 3]]| {
-            let from = (y * width) as usize;
-            of[from..from + size[0] as usize].to_vec()
+    // The command is another one as long as the scene is not read, or while the panels find their size.
+    viewer.until("a picture that the copied command draws", |viewer| {
+        viewer.key(C, None);
+        let command = viewer.line();
+        let (size, expected) = drawn(folder, &command);
+        viewer.key(ESCAPE, None);
+        let is_shown = || {
+            let (window, pixels) = viewer.pixels()?;
+            // It begins at the left, below the bar.
+            let rows = window[1].checked_sub(size[1])?;
+            let row = |y: u32, width: u32, of: &[[u8; 3]]| {
+                let from = (y * width) as usize;
+                of[from..from + size[0] as usize].to_vec()
+            };
+            let is_at =
+                |above: &u32| (0..size[1]).all(|y| row(above + y, window[0], &pixels) == row(y, size[0], &expected));
+            (0..=rows).find(is_at)
         };
-        let is_at =
-            |above: &u32| (0..size[1]).all(|y| row(above + y, window[0], &pixels) == row(y, size[0], &expected));
-        (0..=rows).find(is_at)
-    });
-    (command, expected)
+        let soon = (0..200).any(|_| {
+            std::thread::sleep(Duration::from_millis(30));
+            is_shown().is_some()
+        });
+        soon.then_some((command, expected))
+    })
 }
 
 /// Copies the command until it is as expected: a scene that is read again takes its time.
@@ -623,14 +630,18 @@ fn many_interactions_leave_nothing_behind() {
         }
         std::thread::sleep(Duration::from_secs(2));
     };
-    let count = 1500;
-    act(&mut viewer, count / 3);
-    let before = viewer.resident();
+    // Memory grows while some panel or picture is shown for the first time, and how many rounds that takes depends on
+    // the machine. What each interaction leaves behind makes it grow in every round.
+    let (count, rounds) = (500, 6);
     act(&mut viewer, count);
-    let after = viewer.resident();
-    let found = format!("{before} KiB after {} interactions, {after} KiB after {count} more", count / 3);
-    eprintln!("{found}");
-    assert!(after < before + before / 10, "{found}");
+    let mut found = vec![viewer.resident()];
+    let quiet = (0..rounds).any(|_| {
+        act(&mut viewer, count);
+        found.push(viewer.resident());
+        found[found.len() - 1] < found[found.len() - 2] + count as u64
+    });
+    eprintln!("KiB after rounds of {count} interactions: {found:?}");
+    assert!(quiet, "each round of {count} interactions takes more than a KiB for each: {found:?} KiB");
     viewer.key(ESCAPE, None);
     std::thread::sleep(Duration::from_secs(5));
     // A machine that does other things may need a while to get there.
