@@ -46,11 +46,11 @@ PhotonSample sample_photons(vec3 p, vec3 n, float x, bool wanted) {
     float sum = 0.0;
     uint end = wanted ? photon_node_at(0).next : 0u;
     uint at = 0;
-    // The last iterations assign nothing: lavapipe may lose what a lane assigns in them (lib/trace.glsl).
+    // No last iteration assigns what is used after its loop: lavapipe may lose it (lib/trace.glsl).
     uint count;
     do {
-        // To the next leaf whose box holds the point: a subgroup visits photons together, not whenever one lane has a leaf
-        // (Aila and Laine 2009; docs/decisions/architectures.md).
+        // Goes to the next leaf whose box holds the point. So the lanes of a subgroup visit photons together (Aila and Laine
+        // 2009; docs/decisions/architectures.md).
         count = 0;
         uint first = 0;
         bool searches;

@@ -78,8 +78,6 @@ pub struct Pilot {
     pub plain_ms: f64,
     /// Estimated samples for the resolution [`RESOLVED`].
     pub wanted: u32,
-    /// How far the planned bands of wavelengths are off; see [`Reference::off_by_bands`].
-    pub off_by_bands: f64,
     /// Warnings for the report.
     pub warnings: Vec<String>,
 }
@@ -246,8 +244,7 @@ impl Pilot {
             let why = if by_wavelength && !has_time { short } else { same };
             let warnings = if called_for { vec![why.to_owned()] } else { Vec::new() };
             let knobs = rungs("rgb")?;
-            let wanted = wanted(&plain);
-            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted, off_by_bands: 0.0, warnings });
+            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted: wanted(&plain), warnings });
         };
         let each_ms = |bands: u32| more * seen.each_ms * f64::from(bands) / 8.0;
         let affordable = |bands: &u32| samples_within(each_ms(*bands), share * budget_ms) >= FEWEST_SAMPLES;
@@ -255,13 +252,12 @@ impl Pilot {
         // Each band has its own random numbers.
         let wanted = (wanted(&seen) * 8).div_ceil(bands).max(FEWEST_SAMPLES);
         let knobs = rungs(&format!("spectral:{bands}"))?;
-        let off_by_bands = if bands == BANDS[0] { 0.0 } else { off_by_bands(bench, bands)? };
-        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, off_by_bands, warnings: Vec::new() })
+        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings: Vec::new() })
     }
 }
 
-/// Root mean square difference in display values 0 to 1 between `bands` bands of wavelengths and the most, in pictures by
-/// rays with one sample, which have no noise.
+/// Root mean square difference in display values 0 to 1 between `bands` bands of wavelengths and the most, of pictures
+/// by rays with one sample, which have no noise.
 ///
 /// # Errors
 /// When a picture cannot be drawn.
@@ -274,7 +270,7 @@ pub fn off_by_bands(bench: &Bench<'_>, bands: u32) -> Result<f64> {
         }
         let mut renderer = bench.renderer(&knobs, bench.settings.seed)?;
         renderer.render(bench.camera, &mut |_| ())?;
-        Ok(shown(&bench.film(renderer.film()?), &bench.settings.view_transform()))
+        Ok(shown(&bench.film(renderer.film_alone()?), &bench.settings.view_transform()))
     };
     let [few, most] = [shown_in(bands)?, shown_in(BANDS[0])?];
     let squares = few.as_flattened().iter().zip(most.as_flattened()).map(|(a, b)| f64::from(a - b).powi(2));
@@ -291,15 +287,24 @@ fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
 }
 
 impl Refined {
-    /// The first round of a planned reference.
+    /// The same with [`Reference::off_by_bands`], if it has fewer bands of wavelengths than the most. It is measured in
+    /// a picture of the pilot's size.
     ///
     /// # Errors
-    /// When the round cannot be drawn.
-    pub fn first(pilot: &Pilot, bench: &Bench<'_>, samples: u32, progress: &mut dyn FnMut(Progress)) -> Result<Self> {
-        Ok(Self { off_by_bands: pilot.off_by_bands, ..Self::round(None, bench, &pilot.knobs, samples, progress)? })
+    /// When a picture cannot be drawn.
+    pub fn aware_of_bands(self, bench: &Bench<'_>) -> Result<Self> {
+        let bands = self.knobs.colour.bands();
+        if bands == 0 || bands == BANDS[0] || self.off_by_bands > 0.0 {
+            return Ok(self);
+        }
+        let asked = bench.settings.size;
+        let is_share = bench.settings.share != TileShare::ALL;
+        let few = if is_share { asked } else { fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0)) };
+        Ok(Self { off_by_bands: off_by_bands(&resized(bench, few), bands)?, ..self })
     }
 
-    /// Draws one more round of `samples` samples, after the rounds of `known`.
+    /// Draws one more round of `samples` samples, after the rounds of `known`. Without one the reference is not
+    /// [aware of its bands](Refined::aware_of_bands).
     ///
     /// # Errors
     /// When the round cannot be drawn.

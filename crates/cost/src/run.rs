@@ -173,7 +173,7 @@ impl Run<'_> {
         if agenda.plain.colour != rungs.colour {
             let off = match reference.off_by_bands {
                 0.0 => String::new(),
-                off => format!(", which leaves it off by up to {:.2} % of the range", 100.0 * off),
+                off => format!(", which leaves it off by {:.2} % of the range, as far as rays tell", 100.0 * off),
             };
             found.warnings.push(format!(
                 "the reference has {} of at most {} bands of wavelengths{off}; knobs other than colour are measured in RGB",
@@ -203,8 +203,11 @@ impl Run<'_> {
         let (budget_s, pilot) = (f64::from(budget_s), &self.pilot);
         // A reference that cannot be read is drawn again.
         let kept = || Some(Refined::read(&(self.sweep.kept)(self.command)?).ok()??.0);
-        if let Some(known) = begun.or_else(|| if reference_samples.is_none() { kept() } else { None }) {
-            return Ok(known);
+        // More bands of wavelengths than an earlier budget had time for begin anew.
+        let has_bands = |known: &Refined| known.knobs().colour.bands() >= pilot.knobs.colour.bands();
+        let kept = || if reference_samples.is_none() { kept().filter(has_bands) } else { None };
+        if let Some(known) = begun.or_else(kept) {
+            return known.aware_of_bands(&self.bench);
         }
         let samples = match reference_samples {
             Some(samples) => samples,
@@ -218,11 +221,11 @@ impl Run<'_> {
         // Round up to a rung: rungs are powers of four.
         let samples = if samples.trailing_zeros() % 2 == 1 { 2 * samples } else { samples };
         let left_s = |at: &Progress| f64::from(at.of - at.done) * pilot.each_ms / 1e3 + (1.0 - FIRST_SHARE) * budget_s;
-        let refined = Refined::first(pilot, &self.bench, samples, &mut |at| {
+        let refined = Refined::round(None, &self.bench, &pilot.knobs, samples, &mut |at| {
             let (done, of, left_s) = (at.done as usize, at.of as usize, left_s(&at));
             (listener.step)(Step { name: "reference", done, of, left_s });
         })?;
-        Ok(refined)
+        refined.aware_of_bands(&self.bench)
     }
 
     /// Draws more rounds of the reference, for at most `seconds` seconds.
@@ -386,9 +389,9 @@ impl Run<'_> {
         }
         warnings.extend(found.warnings.iter().chain(&m.warnings).cloned());
         if !reference.converged {
+            let [lacks, remedy] = reference.shortcoming();
             warnings.push(format!(
-                "do not trust differences below {:.2} %: the reference is still noisy after {} samples (target {:.1} %); run the same \
-                 command again to improve the reference",
+                "do not trust differences below {:.2} %: the reference {lacks} after {} samples (target {:.1} %); {remedy}",
                 100.0 * reference.resolution,
                 reference.samples,
                 100.0 * RESOLVED

@@ -95,8 +95,8 @@ pub struct Reference {
     pub own_flip: f64,
     /// Resolution: least error of display values 0 to 1 that is significant.
     pub resolution: f64,
-    /// Root mean square, in display values 0 to 1, of what fewer bands of wavelengths than the most are off, measured
-    /// without paths; a part of `resolution` and of every interval.
+    /// Root mean square, in display values 0 to 1, by which fewer bands of wavelengths than the most are off, as far as
+    /// rays tell; a part of `resolution`, and of the intervals of errors and of their differences.
     #[serde(default)]
     pub off_by_bands: f64,
     /// Whether `resolution` is at most [`RESOLVED`].
@@ -107,6 +107,19 @@ pub struct Reference {
     pub command: String,
     /// Hash of the picture file.
     pub image: String,
+}
+
+impl Reference {
+    /// What keeps it from converging, and what would improve it.
+    #[must_use]
+    pub fn shortcoming(&self) -> [&'static str; 2] {
+        // Resolution without noise (`ShownReference::resolution`).
+        if (1.0 + std::f64::consts::SQRT_2) * self.off_by_bands > RESOLVED {
+            ["has too few bands of wavelengths", "a larger --budget draws more of them"]
+        } else {
+            ["is still noisy", "run the same command again to improve it"]
+        }
+    }
 }
 
 /// One of the pictures whose mean is the reference.
