@@ -466,6 +466,9 @@ fn shows_beside_panels(viewer: &mut Viewer<'_>, folder: &Path) -> (String, Vec<[
             std::thread::sleep(Duration::from_millis(30));
             is_shown().is_some()
         });
+        if !soon {
+            eprintln!("not shown yet: `{command}`");
+        }
         soon.then_some((command, expected))
     })
 }

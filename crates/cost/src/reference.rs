@@ -92,6 +92,7 @@ pub struct Refined {
     knobs: Knobs,
     /// PNG file of the only round; `None` for several rounds.
     png: Option<Vec<u8>>,
+    /// See [`Reference::off_by_bands`].
     off_by_bands: f64,
 }
 
@@ -201,6 +202,13 @@ fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
     Ok(Look { parts, each_ms: ms / samples, wanted: samples * (resolution / RESOLVED).powi(2) })
 }
 
+/// Width and height of a pilot in pixels. A share of the tiles has few pixels already.
+fn pilot_size(bench: &Bench<'_>) -> [u32; 2] {
+    let asked = bench.settings.size;
+    let is_share = bench.settings.share != TileShare::ALL;
+    if is_share { asked } else { fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0)) }
+}
+
 impl Pilot {
     /// Draws a few samples and plans the reference. `called_for`: whether the scene calls for the knob `colour`.
     /// `budget_ms`: time budget of the run; `share`: fraction of it for the reference. `may_shrink`: whether to measure
@@ -210,10 +218,7 @@ impl Pilot {
     /// When the pilot cannot be drawn.
     pub fn draw(bench: &Bench<'_>, called_for: bool, [budget_ms, share]: [f64; 2], may_shrink: bool) -> Result<Self> {
         let begun = Instant::now();
-        let asked = bench.settings.size;
-        // A share of the tiles has few pixels already.
-        let is_share = bench.settings.share != TileShare::ALL;
-        let few = if is_share { asked } else { fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0)) };
+        let (asked, few) = (bench.settings.size, pilot_size(bench));
         let bench = &resized(bench, few);
         let plain = look(bench, "rgb")?;
         let by_wavelength = called_for && told_by_wavelength(bench);
@@ -262,12 +267,12 @@ impl Pilot {
 /// # Errors
 /// When a picture cannot be drawn.
 pub fn off_by_bands(bench: &Bench<'_>, bands: u32) -> Result<f64> {
-    let rays = ["reflection=ray", "refraction=ray", "fresnel=exact", "samples=1"];
+    let mut rays = Knobs::of(Model::Local);
+    for choice in ["reflection=ray", "refraction=ray", "fresnel=exact", "samples=1"] {
+        rays.set(choice)?;
+    }
     let shown_in = |bands: u32| -> Result<Shown> {
-        let mut knobs = Knobs::of(Model::Local);
-        for choice in rays.map(str::to_owned).iter().chain([&format!("colour=spectral:{bands}")]) {
-            knobs.set(choice)?;
-        }
+        let knobs = set(&rays, "colour", &format!("spectral:{bands}"))?;
         let mut renderer = bench.renderer(&knobs, bench.settings.seed)?;
         renderer.render(bench.camera, &mut |_| ())?;
         Ok(shown(&bench.film(renderer.film_alone()?), &bench.settings.view_transform()))
@@ -297,10 +302,7 @@ impl Refined {
         if bands == 0 || bands == BANDS[0] || self.off_by_bands > 0.0 {
             return Ok(self);
         }
-        let asked = bench.settings.size;
-        let is_share = bench.settings.share != TileShare::ALL;
-        let few = if is_share { asked } else { fewer(asked, (pixels(asked) / PILOT_PIXELS).max(1.0)) };
-        Ok(Self { off_by_bands: off_by_bands(&resized(bench, few), bands)?, ..self })
+        Ok(Self { off_by_bands: off_by_bands(&resized(bench, pilot_size(bench)), bands)?, ..self })
     }
 
     /// Draws one more round of `samples` samples, after the rounds of `known`. Without one the reference is not

@@ -28,13 +28,13 @@ fn few_bands_widen_intervals() {
     assert!(off[0] > 2.0 * off[1] && off[1] > 1e-3, "{off:?}");
     // Pictures without noise, so that nothing else widens an interval. They have eight bits.
     let rgb = picture("colour=rgb");
-    let true_error = ShownReference::exact(&picture("colour=spectral:32")).error(&rgb).mean;
+    let exact_error = ShownReference::exact(&picture("colour=spectral:32")).error(&rgb).mean;
     for (bands, off) in [(8, off[0]), (16, off[1])] {
         let by_bands = || ShownReference::exact(&picture(&format!("colour=spectral:{bands}")));
         let blind = by_bands().error(&rgb).interval();
-        assert!(true_error < blind.low || true_error > blind.high, "{bands}: {true_error} in {blind:?}");
+        assert!(exact_error < blind.low || exact_error > blind.high, "{bands}: {exact_error} in {blind:?}");
         let aware = by_bands().also_off(off + 0.5 / 255.0).error(&rgb).interval();
-        assert!(aware.low <= true_error && true_error <= aware.high, "{bands}: {true_error} not in {aware:?}");
+        assert!(aware.low <= exact_error && exact_error <= aware.high, "{bands}: {exact_error} not in {aware:?}");
     }
     assert_eq!(gpu.errors(), Vec::<String>::new());
 }

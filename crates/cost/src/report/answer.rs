@@ -63,7 +63,8 @@ pub(super) fn lead(table: &Table) -> Markup {
         @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } "."
         @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most.0) } (in_parentheses(most.1)) ": " (most.0.about()) }
         @if !table.reference.converged {
-            " The " (words::link("reference", "reference")) " " (table.reference.shortcoming()[0]) ": do not trust differences below " (percent(table.reference.resolution)) "."
+            @let [lacks, _] = table.reference.shortcoming();
+            " The " (words::link("reference", "reference")) " " (lacks) ": do not trust differences below " (percent(table.reference.resolution)) "."
         }
         @if !seen { " No knob changes this picture visibly." }
     }
@@ -186,8 +187,9 @@ pub(super) fn trust(table: &Table) -> Markup {
                 @if r.converged {
                     "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more is significant. The difference between two pictures is known more precisely, because both are compared with the same noisy reference."
                 } @else {
-                    "The " (words::link("reference", "reference")) " " (r.shortcoming()[0]) ": do not trust differences below " (percent(r.resolution)) ". The target is "
-                    (plain(100.0 * RESOLVED)) " %; " (r.shortcoming()[1]) "."
+                    @let [lacks, remedy] = r.shortcoming();
+                    "The " (words::link("reference", "reference")) " " (lacks) ": do not trust differences below " (percent(r.resolution)) ". The target is "
+                    (plain(100.0 * RESOLVED)) " %; " (remedy) "."
                 }
                 " A question mark marks a difference that may be noise. In at most 1 of 100 runs is any statement of this page "
                 "wrong due to noise: intervals are two standard errors wide to each side, but a statement is made only from "
