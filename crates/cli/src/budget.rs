@@ -22,7 +22,7 @@ use etalon_cost::choose::{SPARE, at_most, most_exact, quickest, within};
 use etalon_cost::difference::Truth;
 use etalon_cost::reference::{NotMeasured, Refined};
 use etalon_cost::statistics::Interval;
-use etalon_cost::sweep::{Listener, Sweep, SweepExtent};
+use etalon_cost::sweep::{Listener, Sweep, SweepExtent, extent_of};
 use etalon_cost::table::{Point, Table};
 use etalon_cost::warm::Bench;
 
@@ -32,8 +32,8 @@ const QUICK_S: u32 = 30;
 const TRIALS: usize = 4;
 /// Random seed of all measurements; the seed of the picture does not change the choice.
 const SEED: u32 = 0;
-/// Files of a run that are kept for later budgets; the table is written last.
-const KEPT: [&str; 4] = ["reference.png", "reference.exr", "reference.json", "cost.json"];
+/// Files of a run that are kept for later budgets: the table, which is written last, and the reference.
+const KEPT: [&str; 4] = ["cost.json", "reference.png", "reference.exr", "reference.json"];
 
 /// Limit for a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -96,15 +96,27 @@ pub(super) fn known(command: &str, contents: &str, info: &DeviceInfo) -> Option<
     serde_json::from_slice(&bytes).ok()
 }
 
-/// Copies the table and the reference of a finished run to the cache. Where the cache cannot be written, later budgets
-/// measure again.
+/// Copies the table and the reference of a finished run to the cache, unless the ones there are better. Where the cache
+/// cannot be written, later budgets measure again.
 pub(super) fn keep(command: &str, setup: &Setup, from: &Path) {
     let Some(to) = folder(command, &setup.contents(), setup.device.info()) else { return };
+    let read =
+        |folder: &Path| -> Option<Table> { serde_json::from_slice(&file::read(&folder.join("cost.json")).ok()?).ok() };
+    let [before, now] = [&to, from].map(read);
+    let better =
+        |of: &dyn Fn(&Table) -> (u32, u32)| before.as_ref().is_none_or(|known| now.as_ref().map(of) >= Some(of(known)));
+    if !better(&|table| table.reference.extent()) {
+        return;
+    }
+    let [table, reference @ ..] = KEPT;
+    let has_more = better(&|table| (table.points.len() as u32, 0));
     let copy = || -> Result<()> {
-        // The run.json of a quick run does not describe this table.
-        let _ = std::fs::remove_dir_all(&to);
+        if has_more {
+            // The run.json of a quick run does not describe this table.
+            let _ = std::fs::remove_dir_all(&to);
+        }
         std::fs::create_dir_all(&to)?;
-        for name in KEPT {
+        for name in reference.into_iter().chain(has_more.then_some(table)) {
             file::write(&to.join(name), &file::read(&from.join(name))?)?;
         }
         Ok(())
@@ -217,7 +229,7 @@ impl Budget {
 fn measured(folder: &Path, settings: &Settings) -> Result<(Table, Truth)> {
     let table = serde_json::from_slice(&file::read(&folder.join("cost.json"))?)?;
     let (refined, _) = Refined::read(folder)?.context("the folder has no reference")?;
-    Ok((table, refined.truth(settings)))
+    Ok((table, refined.truth(&settings.view_transform())))
 }
 
 /// Measures with a budget of [`QUICK_S`] seconds, or with the smallest budget that measures something.
@@ -231,12 +243,13 @@ fn measure(
 ) -> Result<()> {
     let contents = setup.contents();
     let run = |budget_s: u32| -> Result<Table> {
-        if !folder.join("run.json").exists() || budget_s != QUICK_S {
+        let extent = SweepExtent { budget_s, reference_samples: None, shard: [1, 1] };
+        if extent_of(folder).as_ref() != Some(&extent) {
             // Remove the remains of an unfinished run.
             let _ = std::fs::remove_dir_all(folder);
         }
         setup.bench(options, settings.clone(), |bench| {
-            let extent = SweepExtent { budget_s, reference_samples: None, shard: [1, 1] };
+            let extent = extent.clone();
             let sweep = Sweep {
                 bench,
                 folder,
@@ -302,7 +315,7 @@ impl Chosen {
         self.took_ms = Some(Interval::of(&times).median);
         let rgba = rendered.display.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
         let picture = Display { width: size[0], height: size[1], rgba };
-        self.found_error = Some(self.truth.shown.error(&picture).interval().root());
+        self.found_error = Some(self.truth.shown.error_interval(&picture));
         Ok(())
     }
 

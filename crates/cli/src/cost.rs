@@ -58,10 +58,10 @@ pub struct CostArgs {
     #[arg(long, value_name = "I/N", value_parser = shard, requires = "reference_samples", help_heading = heading::SWEEP)]
     shard: Option<[u32; 2]>,
     /// Join the parts of a run from these folders instead of measuring
-    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "compare"], help_heading = heading::SWEEP)]
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with_all = ["shard", "reference_samples", "budget", "compare", "SceneOptions", "PictureOptions", "DeviceOptions"], help_heading = heading::SWEEP)]
     merge: Vec<PathBuf>,
     /// Compare two finished runs of one scene, for example on two devices, instead of measuring
-    #[arg(long, value_names = ["DIR", "DIR"], num_args = 2, conflicts_with_all = ["shard", "reference_samples", "compare", "merge"], help_heading = heading::COMPARISON)]
+    #[arg(long, value_names = ["DIR", "DIR"], num_args = 2, conflicts_with_all = ["shard", "reference_samples", "budget", "compare", "merge", "SceneOptions", "PictureOptions", "DeviceOptions"], help_heading = heading::COMPARISON)]
     beside: Vec<PathBuf>,
     /// Also compare a picture of another program with the reference: OpenEXR or PNG of the same size
     #[arg(long, value_name = "FILE", conflicts_with_all = ["merge", "compare", "beside"], help_heading = heading::COMPARISON)]
@@ -114,7 +114,7 @@ fn reference_samples(text: &str) -> Result<u32, String> {
 pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
     let output = args.output.clone().unwrap_or_default();
     if !args.merge.is_empty() {
-        let table = merge(&args.merge, &output, &args.picture.settings(&args.scene)?)?;
+        let table = merge(&args.merge, &output)?;
         return write(args, &output, &table);
     }
     if let [a, b] = &args.beside[..] {

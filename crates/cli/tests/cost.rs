@@ -87,6 +87,7 @@ fn a_run_is_what_its_commands_draw() {
 
     // Every figure of the page is in it, and nothing is loaded from anywhere.
     let page = std::fs::read_to_string(at.join("a/report.html")).expect("a page");
+    assert!(page.contains("--reference-samples 16 -o FOLDER") && !page.contains("20 s budget"));
     assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>"));
     assert!(!page.contains("http://") && !page.contains("https://") && !page.contains("<link"), "loads something");
     for point in points {
@@ -167,6 +168,10 @@ fn a_run_is_what_its_commands_draw() {
     }
     let other = etalon(at, &[&["cost", "study:radiance", "-o", "a"], &COMMON[..]].concat(), &HASTY);
     other.failed(1, "holds another run");
+    // A table of fewer pictures does not replace the one that is kept.
+    let few = ["--size", "40x24", "--device", "cpu", "--budget", "3", "-o", "few"];
+    etalon(at, &[&["cost", "study:lamps"], &few[..]].concat(), &HASTY).succeeded();
+    assert_eq!(number(&budget(&["--within", "1000000"])["error"]["median"]), least);
 
     // Two tables side by side: of one device everything is the same.
     let said = etalon(at, &["cost", "--beside", "a", "a", "--json"], &[]).succeeded().stdout;
@@ -183,8 +188,8 @@ fn parts_make_the_whole() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let parts = [
-        run(at, "study:golden-bridge", "p1", &["--shard", "1/2"]),
-        run(at, "study:golden-bridge", "p2", &["--shard", "2/2"]),
+        run(at, "study:golden-bridge", "p1", &["--shard", "1/2", "--exposure", "1.5"]),
+        run(at, "study:golden-bridge", "p2", &["--shard", "2/2", "--exposure", "1.5"]),
     ];
     etalon(at, &["cost", "--merge", "p1", "p2", "-o", "all"], &[]).succeeded();
     let table: Value =
@@ -193,7 +198,13 @@ fn parts_make_the_whole() {
     assert_eq!(count(&table), count(&parts[0]) + count(&parts[1]));
     assert!(count(&parts[0]).abs_diff(count(&parts[1])) <= 3);
     named(&table, "recursive");
+    // They are judged as the parts show them: what a part says of its pictures holds for the whole.
+    for point in parts.iter().flat_map(|part| list(part, "points")) {
+        let name = point["name"].as_str().expect("a name");
+        assert_eq!(named(&table, name)["error"], point["error"], "{name}");
+    }
     assert!(at.join("all/report.html").exists());
+    etalon(at, &["cost", "--merge", "p1", "p2", "-o", "b", "--exposure", "2"], &[]).failed(2, "cannot be used with");
     etalon(at, &["cost", "--merge", "p1", "all/pictures", "-o", "b"], &[]).failed(1, "cost.json");
     etalon(at, &["cost", "--merge", "p2", "-o", "b"], &[]).failed(1, "part 1/2 is missing");
     etalon(at, &["cost", "--merge", "p1", "p1", "-o", "b"], &[]).failed(1, "part 1/2 is given twice");
@@ -242,6 +253,12 @@ fn one_approximation_has_two_lines_and_a_verdict() {
         "{said}"
     );
     assert!(lines[2].contains("adds an error of"), "{said}");
+    // Where only one of both traces paths, its noise is taken away as in a reference.
+    let by_path = ["--model", "recursive", "--json"];
+    let json = compare("study:cornell", "indirect=occlusion:16,path", &by_path).succeeded().stdout;
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    let error = |end: &str| number(&json["price"]["shown_delta"][end]).sqrt();
+    assert!(json["price"]["error_told"] == true && error("low") > 0.05 && error("high") < 0.1, "{json}");
     let said = compare("study:radiance", "absorption=off,path", &["--set", "samples=1"]).succeeded().stdout;
     assert!(said.contains("bit-identical"), "{said}");
     let global = ["--model", "global", "--set", "samples=4", "--json"];

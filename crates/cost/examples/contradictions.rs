@@ -16,7 +16,6 @@
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
-use etalon::frame::Settings;
 use etalon_cost::judge::{Judge, Record};
 use etalon_cost::reference::Refined;
 use etalon_cost::table::{Family, Point, Price, REFERENCE, Table};
@@ -69,7 +68,7 @@ fn compare(a: &Table, b: &Table, measured: bool, count: &mut Count) {
             let rules_out = truth.time_told && truth.share * now.share < 0.0;
             count.say(!rules_out, || format!("{}: {:+.3} of the time / {:+.3}", now.point, now.share, truth.share));
         }
-        if now.verdict.ends_with("wasted here") {
+        if now.is_wasted() {
             let helps = truth.base == Family::Local && told(truth) < 0.0 && truth.is_seen();
             count.say(!helps, || format!("{}: {} / {}", now.point, now.verdict, truth.verdict));
         }
@@ -111,7 +110,7 @@ fn main() -> Result<()> {
         let table = read(&a.join("cost.json"))?;
         let (refined, reference) = Refined::read(b)?.with_context(|| format!("{} has no reference", b.display()))?;
         ensure!(refined.size() == table.size, "{} and {} have different sizes", a.display(), b.display());
-        let truth = refined.truth(&Settings { size: table.size, ..Settings::default() });
+        let truth = refined.truth(&table.reference.view);
         let record = |point: &Point| -> Result<Record> {
             let path = a.join("points").join(format!("{}.json", point.picture));
             let text = std::fs::read(&path).with_context(|| format!("reading {}", path.display()))?;

@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::agenda::Change;
 use super::difference::ShownReference;
 use super::price::{Pair, PairedTimes, TimeNoise, price};
+use super::reference::{LEAST_SAMPLES, Refined};
 use super::statistics::{Interval, MANY, standard_errors};
 use super::table::{Family, Price, WorstPixel};
 use super::warm::{Bench, ENOUGH_MS};
@@ -78,7 +79,15 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let rungs = [knob.rung(&first), knob.rung(&last)];
     let change = Change { knob: knob.name.to_owned(), from: rungs[1].to_owned(), to: rungs[0].to_owned() };
     let pair = Pair::of(&change, &measured, &truth)?;
-    let more = truth.halves.is_none().then(|| ShownReference::exact(&truth.display).error(&measured.display));
+    let more = match (&measured.halves, &truth.halves) {
+        (_, None) => Some(ShownReference::exact(&truth.display).error(&measured.display)),
+        // Only the more exact rung traces paths: it is drawn once more, as a reference whose noise is known.
+        (None, Some(_)) => {
+            let reference = Refined::round(None, bench, &last, truth.samples.max(LEAST_SAMPLES), &mut |_| ())?;
+            Some(reference.truth(&bench.settings.view_transform()).shown.error(&measured.display))
+        }
+        (Some(_), Some(_)) => None,
+    };
     let clock = TimeNoise::of([(&measured.ms[..], &measured.baseline_ms[..])].into_iter());
     let turns = PairedTimes { ms: &measured.ms, baseline_ms: &measured.baseline_ms, clock };
     let family = if more.is_some() { Family::Local } else { Family::Exact };

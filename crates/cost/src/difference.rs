@@ -9,7 +9,7 @@ use palette::color_difference::Ciede2000;
 use palette::{IntoColor, Lab, Srgb};
 use rayon::prelude::*;
 
-use super::statistics::Estimate;
+use super::statistics::{Estimate, Interval};
 use super::table::{Errors, WorstPixel};
 use etalon::image::Picture;
 use etalon::image::metric::{AnyPicture, Comparison, Metric, compare};
@@ -78,7 +78,7 @@ impl Truth {
         }
         let deviation = spread.sqrt() / n;
         let errors = Errors {
-            error: self.shown.error(display).interval().root(),
+            error: self.shown.error_interval(display),
             flip_mean: flip.value,
             flip_p95: f64::from(p95),
             relmse: Estimate { mean: (raw - own) / n, deviation, bias: 0.0 }.interval(),
@@ -165,9 +165,8 @@ pub fn significant(squares: &[(u32, Estimate)], standard_errors: f64) -> Option<
 /// The tone curve is not linear, so the display values of n samples are biased. The bias of twice as many samples is
 /// smaller by a factor r. For a smooth curve and noise with finite variance r is 1/2; where few paths carry most of the
 /// light, r is closer to 1. The mean brightness of quarters, halves and all of the samples gives r, and the rest of the
-/// geometric series is added (Aitken extrapolation; for r = 1/2 it is the jackknife of Quenouille). The mean display
-/// values of `study:pool` are 0.345, 0.396, 0.437 and 0.463 for 2, 4, 8 and 16 samples: the last factor, 0.62, predicts
-/// the following values better than the one before, 0.80.
+/// geometric series is added (Aitken extrapolation; for r = 1/2 it is the jackknife of Quenouille). No series predicts
+/// every scene (docs/cost.md has figures of `study:pool`): hence [`CAUTION`].
 pub struct ShownReference {
     /// The two estimates.
     estimates: [Shown; 2],
@@ -307,6 +306,14 @@ impl ShownReference {
         Estimate { mean, deviation, bias: 2.0 * mean.max(0.0).sqrt() * self.off + self.off * self.off }
     }
 
+    /// Confidence interval of the root mean squared error of display values 0 to 1. Noise moves the square, and a bias β
+    /// the root, by at most β (triangle inequality).
+    #[must_use]
+    pub fn error_interval(&self, x: &Display) -> Interval {
+        let Interval { median, low, high } = Estimate { bias: 0.0, ..self.error(x) }.interval().root();
+        Interval { median, low: (low - self.off).max(0.0), high: high + self.off }
+    }
+
     /// Unbiased difference of the mean squared errors of `x` and `b`: x² − b² − (x − b)(j₁ + j₂). It is linear in the
     /// reference, so that the noise common to both errors cancels. A bias β of the reference changes it by at most 2β
     /// times the root mean square of x − b (Cauchy–Schwarz inequality).
@@ -435,6 +442,19 @@ mod tests {
         let error = covered(&|reference| reference.error(&flat(128)), square(128.0));
         let none = covered(&|reference| reference.error(&flat(140)), square(140.0));
         assert!(more >= 90 && error >= 90 && none >= 90, "{more}, {error} and {none} of 100");
+    }
+
+    /// Where noise and a bias are as large as the error, they add up in the root.
+    #[test]
+    fn a_bias_widens_the_interval_of_the_root() {
+        let reference = || noisy(1, 0.05);
+        let alone = reference().error_interval(&flat(140));
+        let off = reference().also_off(0.01).error_interval(&flat(140));
+        assert!((off.high - alone.high - 0.01).abs() < 1e-12 && off.low == 0.0, "{alone:?} {off:?}");
+        assert!(off.high > reference().also_off(0.01).error(&flat(140)).interval().root().high);
+        let far = reference().also_off(0.01).error_interval(&flat(200));
+        let error = 200.0 / 255.0 - 0.55;
+        assert!(far.low < error - 0.009 && error + 0.009 < far.high, "{far:?} {error}");
     }
 
     /// The sRGB curve is concave: noise darkens display values, and fewer samples darken them more.

@@ -189,7 +189,7 @@ impl Judge<'_> {
     /// When the picture has another size, or cannot be compared.
     pub fn other(&self, name: &str, picture: &AnyPicture, settings: &Settings) -> Result<Other> {
         let (film, display, radiance) = match picture {
-            AnyPicture::Linear(film) => (film.clone(), display_of(film, settings), true),
+            AnyPicture::Linear(film) => (film.clone(), display_of(film, &settings.view_transform()), true),
             // The file has no radiance: its radiance errors are 0.
             AnyPicture::Display(display) => (self.truth.film.clone(), display.clone(), false),
         };
@@ -234,8 +234,9 @@ impl Judge<'_> {
     }
 
     /// Pareto frontier of some points: indices of those that no other of them beats in time and error at once, the
-    /// fastest first, the reference last. Each point has significantly less error than the one before. Of two points
-    /// with equal times the better one is kept.
+    /// fastest first, the reference last. Each point has significantly less error than the one before, and than the
+    /// quicker one with the least error, which is another one where it was not significantly better than the one before
+    /// it. Of two points with equal times the better one is kept.
     fn frontier(&self, points: &[Point], displays: &[Display], sure: f64, some: impl Fn(&Point) -> bool) -> Vec<usize> {
         let reference = points.iter().position(|point| point.name == REFERENCE);
         let time = |i: usize| points[i].gpu_ms.median;
@@ -244,9 +245,14 @@ impl Judge<'_> {
         let mut order: Vec<usize> = (0..displays.len()).filter(|&i| time(i) < limit && some(&points[i])).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
         let mut all: Vec<usize> = Vec::new();
+        let mut least: Option<usize> = None;
         for i in order {
-            let better = |&known: &usize| self.truth.shown.more_error(&displays[i], &displays[known]).is_below(sure);
-            if !all.last().is_none_or(better) {
+            let better = |known: usize| self.truth.shown.more_error(&displays[i], &displays[known]).is_below(sure);
+            let beats_all = all.last().copied().is_none_or(better) && least.is_none_or(better);
+            if least.is_none_or(|least| points[i].error() < points[least].error()) {
+                least = Some(i);
+            }
+            if !beats_all {
                 continue;
             }
             while all.last().is_some_and(|&last| time(i) < SAME_TIME * time(last)) {
@@ -367,7 +373,12 @@ fn the_reference(reference: &Reference, wandered: Option<Interval>) -> Point {
 fn drawing(reference: &Reference) -> String {
     let [first, ..] = &reference.rounds[..] else { return reference.command.clone() };
     let rung = 4_u32.pow((f64::from(reference.samples).log2() / 2.0).round().min(6.0) as u32);
-    reference.command.replace(&format!("samples={}", first.samples), &format!("samples={rung}"))
+    let [given, wanted] = [first.samples, rung].map(|samples| format!(" --set samples={samples} "));
+    match reference.command.contains(&given) {
+        true => reference.command.replace(&given, &wanted),
+        // The preset's samples are not said.
+        false => reference.command.replace(" -o ", &format!("{wanted}-o ")),
+    }
 }
 
 /// Middle of the square of [`REGION`] pixels whose mean display values differ most between two pictures. Noise and

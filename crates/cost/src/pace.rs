@@ -71,8 +71,20 @@ impl<'a> Pace<'a> {
     /// Seconds that the budget leaves for drawing, without the time to evaluate and show the drawn pictures.
     #[must_use]
     pub fn left_s(&self) -> f64 {
-        let after = self.judged_s * self.done as f64 + self.after_s;
+        let after = self.judging_s() + self.after_s;
         if (self.stopped)() { 0.0 } else { self.budget_s - after - self.took_s() }
+    }
+
+    /// Estimated seconds to evaluate and show all drawn pictures once.
+    #[must_use]
+    pub fn judging_s(&self) -> f64 {
+        self.judged_s * self.done as f64
+    }
+
+    /// Estimated seconds of the next picture.
+    #[must_use]
+    pub fn next_s(&self) -> f64 {
+        self.forecast.as_it_went(self.forecast.next())
     }
 
     /// Adds `count` coming pictures.
@@ -119,7 +131,8 @@ impl<'a> Pace<'a> {
     /// Leaves out the next `count` pictures.
     pub fn leave_out(&mut self, count: usize) {
         for _ in 0..count {
-            self.left_out_s += self.forecast.begin();
+            let expected = self.forecast.begin();
+            self.left_out_s += self.forecast.as_it_went(expected);
         }
         self.left_out += count;
     }

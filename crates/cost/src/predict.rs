@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::pace::Step;
 use super::size::{Growth, pixels, scaled, shared};
-use super::statistics::Interval;
+use super::statistics::{IN_95, Interval};
 use super::sweep::{Listener, Sweep, SweepExtent};
 use super::table::{Point, REFERENCE, Table};
 use super::tiles::{spread, standard_error};
@@ -68,9 +68,7 @@ pub fn predict(bench: &Bench<'_>, trial: &Trial<'_>, progress: &mut dyn FnMut(St
         // Beside noise: the tiles that are drawn are not those that are left out.
         let picture = display(&format!("pictures/{}.png", point.picture))?;
         let scatter = IN_90_OF_TILES * standard_error(&picture, &reference, left_out) * e.median;
-        // The table's intervals hold all together; those of a forecast hold each by itself.
-        let alone = IN_90 / table.standard_errors.max(IN_90);
-        let [below, above] = [e.median - e.low, e.high - e.median].map(|noise| (noise * alone).hypot(scatter));
+        let [below, above] = [e.median - e.low, e.high - e.median].map(|noise| (noise * IN_90 / IN_95).hypot(scatter));
         let whole = sweep.bench.draws_all(&point.rungs()?)?;
         Ok(Prediction {
             picture: point.name.clone(),

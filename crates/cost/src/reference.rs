@@ -17,10 +17,11 @@ use super::size::{fewer, pixels, resized};
 use super::statistics::{MANY, standard_errors};
 use super::table::{RESOLVED, Reference, Round};
 use super::warm::{Bench, total};
-use etalon::frame::{Progress, Settings, TileShare};
+use etalon::frame::{Progress, TileShare};
 use etalon::image::halves::error_of_halves;
 use etalon::image::metric::{AnyPicture, Metric, compare};
 use etalon::image::png::Display;
+use etalon::image::tone::ViewTransform;
 use etalon::image::{Aov, AovData, Picture, exr, file, png, tone};
 use etalon::plan::{Knobs, Model};
 
@@ -28,7 +29,7 @@ use etalon::plan::{Knobs, Model};
 pub(super) const BANDS: [u32; 3] = [32, 16, 8];
 const FEWEST_SAMPLES: u32 = 16;
 /// Least samples of a reference: four parts are needed to estimate its error.
-const LEAST_SAMPLES: f64 = 4.0;
+pub(super) const LEAST_SAMPLES: u32 = 4;
 /// Samples of a pilot.
 const PILOT: u32 = 4;
 /// Approximate number of pixels of a pilot; time and noise of a sample are scaled by pixels.
@@ -100,7 +101,7 @@ pub struct Refined {
 /// for an error estimate.
 #[must_use]
 pub fn samples_within(ms_each: f64, limit_ms: f64) -> u32 {
-    [4096, 1024, 256, 64, 16].into_iter().find(|&n| f64::from(n) * ms_each <= limit_ms).unwrap_or(4)
+    [4096, 1024, 256, 64, 16].into_iter().find(|&n| f64::from(n) * ms_each <= limit_ms).unwrap_or(LEAST_SAMPLES)
 }
 
 /// Random seed of a round. A user is unlikely to choose the same seed: a picture that shares random numbers with the
@@ -151,7 +152,7 @@ fn draw(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(Parts, Vec<u8>, f64)> {
     let samples = knobs.samples.count();
-    ensure!(samples >= 4, "{samples} samples cannot be split into parts: a bug of Etalon");
+    ensure!(samples >= LEAST_SAMPLES, "{samples} samples cannot be split into parts: a bug of Etalon");
     let each = samples / 2;
     let mut renderer = bench.renderer(knobs, seed)?;
     let mut drawing = renderer.begin(bench.camera, samples);
@@ -211,8 +212,8 @@ fn pilot_size(bench: &Bench<'_>) -> [u32; 2] {
 
 impl Pilot {
     /// Draws a few samples and plans the reference. `called_for`: whether the scene calls for the knob `colour`.
-    /// `budget_ms`: time budget of the run; `share`: fraction of it for the reference. `may_shrink`: whether to measure
-    /// fewer pixels if the budget is small.
+    /// `budget_ms`: time budget of the run, infinite if its samples are given: then nothing depends on the clock;
+    /// `share`: fraction of it for the reference. `may_shrink`: whether to measure fewer pixels if the budget is small.
     ///
     /// # Errors
     /// When the pilot cannot be drawn.
@@ -227,7 +228,7 @@ impl Pilot {
         let bands = if by_wavelength && has_time { Some(look(bench, "spectral:8")?) } else { None };
         let mut seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
         let most = if may_shrink { 1.0 } else { pixels(asked) / pixels(few) };
-        if seen.as_ref().is_some_and(|bands| LEAST_SAMPLES * bands.each_ms * most > share * budget_ms) {
+        if seen.as_ref().is_some_and(|bands| f64::from(LEAST_SAMPLES) * bands.each_ms * most > share * budget_ms) {
             (seen, has_time) = (None, false);
         }
 
@@ -344,7 +345,9 @@ impl Refined {
         self.gpu_ms() / f64::from(self.samples().max(1))
     }
 
-    fn gpu_ms(&self) -> f64 {
+    /// GPU milliseconds of all rounds.
+    #[must_use]
+    pub fn gpu_ms(&self) -> f64 {
         self.rounds.iter().map(|round| round.gpu_ms).sum()
     }
 
@@ -372,13 +375,13 @@ impl Refined {
         self.rounds.len()
     }
 
-    /// The reference picture, ready for error measurements.
+    /// The reference picture, ready for error measurements of display values.
     #[must_use]
-    pub fn truth(&self, settings: &Settings) -> Truth {
+    pub fn truth(&self, view: &ViewTransform) -> Truth {
         let (film, half) = (all(&self.parts), half(&self.parts, 0));
         let display = self.png.as_ref().and_then(|png| png::decode_display(png).ok());
-        let display = display.unwrap_or_else(|| display_of(&film, settings));
-        let shown = ShownReference::of(&self.parts, &settings.view_transform()).also_off(self.off_by_bands);
+        let display = display.unwrap_or_else(|| display_of(&film, view));
+        let shown = ShownReference::of(&self.parts, view).also_off(self.off_by_bands);
         Truth { film, half, shown, display }
     }
 
@@ -398,8 +401,9 @@ impl Refined {
         let sum = |half: &Picture| -> Vec<[f32; 4]> { half.rgba.iter().map(|p| p.map(|v| 0.5 * v)).collect() };
         let own = error_of_halves([&sum(&halves[0]), &sum(&halves[1])], 1);
         let any = |display: Display| AnyPicture::Display(display);
-        let half = display_of(&truth.half, &bench.settings);
-        let own_flip = compare(Metric::Flip, &any(display_of(&truth.film, &bench.settings)), &any(half))?.value;
+        let view = bench.settings.view_transform();
+        let half = display_of(&truth.half, &view);
+        let own_flip = compare(Metric::Flip, &any(display_of(&truth.film, &view)), &any(half))?.value;
         let resolution = truth.shown.resolution(standard_errors(STATEMENTS, MANY));
         let png = match &self.png {
             Some(png) => png.clone(),
@@ -420,6 +424,7 @@ impl Refined {
             own_flip,
             resolution,
             off_by_bands: self.off_by_bands,
+            view,
             converged: resolution <= RESOLVED,
             rounds: self.rounds.clone(),
             command: format!("{command} --seed {} {} -o reference.png", self.rounds[0].seed, arguments(&samples)),
@@ -485,12 +490,12 @@ impl Refined {
 }
 
 /// Display values of a film.
-pub(super) fn display_of(film: &Picture, settings: &Settings) -> Display {
+pub(super) fn display_of(film: &Picture, view: &ViewTransform) -> Display {
     let pixel = |v: [f32; 3]| {
         let [r, g, b] = v.map(|v| tone::quantise(f64::from(v)));
         [r, g, b, 255]
     };
-    let rgba = shown(film, &settings.view_transform()).into_iter().map(pixel).collect();
+    let rgba = shown(film, view).into_iter().map(pixel).collect();
     Display { width: film.width, height: film.height, rgba }
 }
 

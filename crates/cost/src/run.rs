@@ -14,7 +14,7 @@ use super::judge::{Judge, Judged};
 use super::measure::Measuring;
 use super::orders;
 use super::pace::{Pace, Step};
-use super::reference::{BANDS, NotMeasured, Pilot, Refined, refine, samples_within};
+use super::reference::{BANDS, LEAST_SAMPLES, NotMeasured, Pilot, Refined, refine, samples_within};
 use super::search::{PICTURES, search, without_waste};
 use super::size::{Growth, resized};
 use super::statistics::Interval;
@@ -34,6 +34,8 @@ const REFERENCE_SHARE: f64 = 0.4;
 const AFTER_SHARE: f64 = 0.08;
 /// Fraction of the budget for the first round of the reference.
 const FIRST_SHARE: f64 = 0.12;
+/// A later run aims at this many times the samples of a reference that is still noisy.
+const AGAIN: u32 = 4;
 /// Budgets from this many seconds on write a preliminary report.
 const EARLY_S: f64 = 90.0;
 /// Estimated time to measure the growth of times with pixels: seconds for four starts, and a number of path-traced
@@ -60,7 +62,6 @@ pub(super) struct Run<'a> {
 struct Found {
     search: Vec<Tried>,
     orders: Vec<QuadratureOrder>,
-    warnings: Vec<String>,
 }
 
 impl Sweep<'_> {
@@ -71,7 +72,7 @@ impl Sweep<'_> {
     pub fn run(&self, listener: &mut Listener<'_>) -> Result<Table> {
         self.claim_folder()?;
         let budget_s = f64::from(self.extent.budget_s);
-        let ends = self.extent.reference_samples.is_none();
+        let ends = self.limit_s().is_finite();
         let mut pace = Pace::new(budget_s, ends, self.stopped);
         (listener.step)(Step { name: "pilot", done: 0, of: 1, left_s: budget_s });
         let states = States::of(&self.bench)?;
@@ -80,8 +81,8 @@ impl Sweep<'_> {
         let begun_size = begun.as_ref().map(Refined::size).filter(|_| self.bench.settings.share == TileShare::ALL);
         let bench = resized(&self.bench, begun_size.unwrap_or(asked));
         let may_shrink = self.may_shrink && ends && self.others.is_empty() && begun.is_none();
-        let share = [budget_s * 1e3, REFERENCE_SHARE];
-        let pilot = Pilot::draw(&bench, states.calls_for("colour"), share, may_shrink)?;
+        let budget = [self.limit_s() * 1e3, REFERENCE_SHARE];
+        let pilot = Pilot::draw(&bench, states.calls_for("colour"), budget, may_shrink)?;
         let size = pilot.size;
         if size != asked {
             pace.after_s = AFTER_SHARE * budget_s;
@@ -101,22 +102,26 @@ impl Run<'_> {
         listener: &mut Listener<'_>,
     ) -> Result<Table> {
         let SweepExtent { budget_s, reference_samples, shard } = self.sweep.extent;
-        let (budget_s, ends) = (f64::from(budget_s), reference_samples.is_none());
         let (bench, pilot) = (&self.bench, &self.pilot);
-        let (records, warnings) = (Vec::new(), Vec::new());
+        let (records, warnings) = (Vec::new(), pilot.warnings.clone());
         let (folder, command) = (self.sweep.folder, self.command);
-        let enough_ms = enough_ms(budget_s);
+        let enough_ms = enough_ms(f64::from(budget_s));
         let mut m = Measuring { bench, folder, command, shard, enough_ms, pace, records, warnings };
         let mut found = Found::default();
 
-        let mut refined = self.first_round(begun, &m.pace, listener)?;
-        found.warnings.extend(pilot.warnings.iter().cloned());
+        let known = self.known(begun);
+        let known_ms = known.as_ref().map_or(0.0, Refined::gpu_ms);
+        let refined = match known {
+            Some(known) => known,
+            None => self.first_round(&m.pace, listener)?,
+        };
+        let mut refined = refined.aware_of_bands(bench)?;
         let rungs = refined.knobs().clone();
-        // With a given number of samples the pictures must not depend on the clock.
         let priced = reference_samples.map(|samples| if samples >= 256 { 16 } else { 4 });
         let each = [pilot.each_ms, pilot.plain_ms];
-        let agenda = Agenda::new(bench, states, &rungs, each, priced, budget_s * 1e3)?;
+        let agenda = Agenda::new(bench, states, &rungs, each, priced, self.sweep.limit_s() * 1e3)?;
         let (mut truth, mut reference) = self.describe(&refined, agenda.priced())?;
+        let wanted = self.wanted(&reference);
         let mut local = m.base(&base_task("local", Family::Preset, &agenda.local), listener.step)?;
         self.expect(&mut m, &agenda);
         // One preset besides `local` is drawn even if the reference needs the rest of the budget.
@@ -124,13 +129,7 @@ impl Run<'_> {
         for task in first {
             m.picture(task, &mut local, listener.step)?;
         }
-        if ends {
-            let share = REFERENCE_SHARE * budget_s - reference.gpu_ms / 1e3;
-            let missing = f64::from(pilot.wanted.saturating_sub(refined.samples())) * refined.each_ms() / 1e3;
-            // Time that is too short for a round is left to pictures.
-            let round = 4.0 * refined.each_ms() / 1e3;
-            m.pace.reserved_s = Some(share.min(missing)).filter(|seconds| *seconds >= round).unwrap_or(0.0);
-        }
+        m.pace.reserved_s = self.reserved_s(&refined, wanted, known_ms);
         // The most informative pictures come first, in case the budget ends.
         for task in presets.iter().chain(&agenda.of_local) {
             m.picture(task, &mut local, listener.step)?;
@@ -139,19 +138,17 @@ impl Run<'_> {
             let judge = Judge { truth: &truth, reference: &reference, folder };
             found.search = search(&mut m, &judge, (&agenda, states), &mut local, listener.step)?;
         } else {
-            found.warnings.push("a part of a run does not search for combinations".to_owned());
+            m.warnings.push("a part of a run does not search for combinations".to_owned());
             m.pace.skip(PICTURES - 1);
         }
         for task in &agenda.ladder {
             m.picture(task, &mut local, listener.step)?;
         }
-        if ends {
-            // The reference gets its share before the changes relative to `exact`, whose errors need a good reference.
-            let share = std::mem::take(&mut m.pace.reserved_s);
-            refined = self.more(refined, &m.pace, pilot.wanted, share, listener)?;
-            (truth, reference) = self.describe(&refined, agenda.priced())?;
-        }
-        if ends && budget_s >= EARLY_S {
+        // The reference gets its share before the changes relative to `exact`, whose errors need a good reference.
+        let share = std::mem::take(&mut m.pace.reserved_s);
+        refined = self.more(refined, &m.pace, wanted, share, listener)?;
+        (truth, reference) = self.describe(&refined, agenda.priced())?;
+        if self.ends() && f64::from(budget_s) >= EARLY_S {
             let begun = Instant::now();
             let judge = Judge { truth: &truth, reference: &reference, folder };
             (listener.early)(&self.table(&judge.judge(&m.records)?, &m, &reference, states, &found))?;
@@ -160,36 +157,50 @@ impl Run<'_> {
         self.prices_of_exact(&mut m, &agenda, listener)?;
         self.orders(&mut m, &agenda, &mut found, listener)?;
 
-        if ends {
-            refined = self.more(refined, &m.pace, pilot.wanted, f64::INFINITY, listener)?;
-            (truth, reference) = self.describe(&refined, agenda.priced())?;
-        }
-        if shard == [1, 1] && m.records.iter().any(|record| record.name == "exact") {
-            let judge = Judge { truth: &truth, reference: &reference, folder };
+        let tries_without_waste = shard == [1, 1] && m.records.iter().any(|record| record.name == "exact");
+        // That takes a picture, for which all others are judged once more.
+        let last_s = if tries_without_waste { m.pace.next_s() + m.pace.judging_s() } else { 0.0 };
+        refined = self.more(refined, &m.pace, wanted, m.pace.left_s() - last_s, listener)?;
+        (truth, reference) = self.describe(&refined, agenda.priced())?;
+        let judge = Judge { truth: &truth, reference: &reference, folder };
+        if tries_without_waste {
             let prices = judge.judge(&m.records)?.prices;
             let tried = without_waste(&mut m, &judge, (&agenda, &prices), &mut local, listener.step)?;
             found.search.extend(tried);
         }
-        if agenda.plain.colour != rungs.colour {
-            let off = match reference.off_by_bands {
-                0.0 => String::new(),
-                off => format!(", which leaves it off by {:.2} % of the range, as far as rays tell", 100.0 * off),
-            };
-            found.warnings.push(format!(
-                "the reference has {} of at most {} bands of wavelengths{off}; knobs other than colour are measured in RGB",
-                rungs.colour.bands(),
-                BANDS[0]
-            ));
-        }
-        let judge = Judge { truth: &truth, reference: &reference, folder };
+        m.warnings.extend(few_bands(&reference, &rungs));
         let other = |(name, picture): &(String, AnyPicture)| judge.other(name, picture, &bench.settings);
         let others = self.sweep.others.iter().map(other).collect::<Result<_>>()?;
         let mut table = Table { others, ..self.table(&judge.judge(&m.records)?, &m, &reference, states, &found) };
         if self.is_smaller() {
-            table.asked = Some(self.at_size(&table, budget_s - m.pace.took_s())?);
+            table.asked = Some(self.at_size(&table, f64::from(budget_s) - m.pace.took_s())?);
             table.took_s = m.pace.took_s();
         }
         Ok(table)
+    }
+
+    /// Whether the budget ends the run.
+    fn ends(&self) -> bool {
+        self.sweep.limit_s().is_finite()
+    }
+
+    /// Samples that the reference should have. A later run improves a reference that has those of the pilot and is still
+    /// noisy. That is decided before it draws samples, and by their variance, not by what they show.
+    fn wanted(&self, reference: &Reference) -> u32 {
+        let enough = reference.samples < self.pilot.wanted || reference.converged || reference.lacks_bands();
+        if enough { self.pilot.wanted } else { AGAIN * reference.samples }
+    }
+
+    /// Seconds to reserve for more rounds of the reference, of which `known_ms` milliseconds are from earlier runs.
+    fn reserved_s(&self, refined: &Refined, wanted: u32, known_ms: f64) -> f64 {
+        if !self.ends() {
+            return 0.0;
+        }
+        let share = REFERENCE_SHARE * self.sweep.limit_s() - (refined.gpu_ms() - known_ms) / 1e3;
+        let missing = f64::from(wanted.saturating_sub(refined.samples())) * refined.each_ms() / 1e3;
+        // Time that is too short for a round is left to pictures.
+        let round = f64::from(LEAST_SAMPLES) * refined.each_ms() / 1e3;
+        Some(share.min(missing)).filter(|seconds| *seconds >= round).unwrap_or(0.0)
     }
 
     /// Whether fewer pixels are measured than requested.
@@ -197,38 +208,39 @@ impl Run<'_> {
         self.bench.settings.size != self.sweep.bench.settings.size
     }
 
-    /// The reference of an interrupted or earlier run, or else a first round.
-    fn first_round(&self, begun: Option<Refined>, pace: &Pace<'_>, listener: &mut Listener<'_>) -> Result<Refined> {
-        let SweepExtent { budget_s, reference_samples, .. } = self.sweep.extent;
-        let (budget_s, pilot) = (f64::from(budget_s), &self.pilot);
+    /// The reference of an interrupted or earlier run.
+    fn known(&self, begun: Option<Refined>) -> Option<Refined> {
         // A reference that cannot be read is drawn again.
         let kept = || Some(Refined::read(&(self.sweep.kept)(self.command)?).ok()??.0);
         // More bands of wavelengths than an earlier budget had time for begin anew.
-        let has_bands = |known: &Refined| known.knobs().colour.bands() >= pilot.knobs.colour.bands();
-        let kept = || if reference_samples.is_none() { kept().filter(has_bands) } else { None };
-        if let Some(known) = begun.or_else(kept) {
-            return known.aware_of_bands(&self.bench);
-        }
+        let has_bands = |known: &Refined| known.knobs().colour.bands() >= self.pilot.knobs.colour.bands();
+        begun.or_else(|| if self.ends() { kept().filter(has_bands) } else { None })
+    }
+
+    /// The first round of a reference.
+    fn first_round(&self, pace: &Pace<'_>, listener: &mut Listener<'_>) -> Result<Refined> {
+        let SweepExtent { budget_s, reference_samples, .. } = self.sweep.extent;
+        let (budget_s, pilot) = (f64::from(budget_s), &self.pilot);
         let samples = match reference_samples {
             Some(samples) => samples,
             None => {
-                let least_s = pace.took_s() + 4.0 * pilot.each_ms / 1e3;
+                let least_s = pace.took_s() + f64::from(LEAST_SAMPLES) * pilot.each_ms / 1e3;
                 let enough_s = (4.0 * least_s).max(20.0).ceil() as u32;
                 ensure!(least_s < budget_s, NotMeasured { budget_s, least_s, enough_s });
-                samples_within(pilot.each_ms, FIRST_SHARE * budget_s * 1e3).min(pilot.wanted.next_power_of_two().max(4))
+                samples_within(pilot.each_ms, FIRST_SHARE * budget_s * 1e3)
+                    .min(pilot.wanted.next_power_of_two().max(LEAST_SAMPLES))
             }
         };
         // Round up to a rung: rungs are powers of four.
         let samples = if samples.trailing_zeros() % 2 == 1 { 2 * samples } else { samples };
         let left_s = |at: &Progress| f64::from(at.of - at.done) * pilot.each_ms / 1e3 + (1.0 - FIRST_SHARE) * budget_s;
-        let refined = Refined::round(None, &self.bench, &pilot.knobs, samples, &mut |at| {
+        Refined::round(None, &self.bench, &pilot.knobs, samples, &mut |at| {
             let (done, of, left_s) = (at.done as usize, at.of as usize, left_s(&at));
             (listener.step)(Step { name: "reference", done, of, left_s });
-        })?;
-        refined.aware_of_bands(&self.bench)
+        })
     }
 
-    /// Draws more rounds of the reference, for at most `seconds` seconds.
+    /// Draws more rounds of the reference, for at most `seconds` seconds; none if the samples are given.
     fn more(
         &self,
         refined: Refined,
@@ -237,6 +249,9 @@ impl Run<'_> {
         seconds: f64,
         listener: &mut Listener<'_>,
     ) -> Result<Refined> {
+        if !self.ends() {
+            return Ok(refined);
+        }
         let begun = Instant::now();
         let left = || pace.left_s().min(seconds - begun.elapsed().as_secs_f64());
         refine(refined, &self.bench, wanted, &left, &mut |at: Progress| {
@@ -247,7 +262,7 @@ impl Run<'_> {
 
     /// The reference picture and its facts; writes both.
     fn describe(&self, refined: &Refined, priced: u32) -> Result<(Truth, Reference)> {
-        let truth = refined.truth(&self.bench.settings);
+        let truth = refined.truth(&self.bench.settings.view_transform());
         let (reference, png) = refined.describe(&truth, self.command, priced, &self.bench)?;
         refined.write(self.sweep.folder, &reference, &png)?;
         file::write(&self.sweep.folder.join("pictures/reference.png"), &png)?;
@@ -281,6 +296,7 @@ impl Run<'_> {
     fn prices_of_exact(&self, m: &mut Measuring<'_>, agenda: &Agenda, listener: &mut Listener<'_>) -> Result<()> {
         let next = m.pace.forecast.next();
         if m.pace.too_late(next) {
+            m.pace.forecast.skip(1);
             m.pace.leave_out(agenda.of_exact.len());
             return Ok(());
         }
@@ -387,9 +403,9 @@ impl Run<'_> {
                  also timed at {w}x{h}; a larger --budget measures everything there"
             ));
         }
-        warnings.extend(found.warnings.iter().chain(&m.warnings).cloned());
+        warnings.extend(m.warnings.iter().cloned());
         if !reference.converged {
-            let [lacks, remedy] = reference.shortcoming();
+            let [lacks, remedy] = reference.shortcoming(!self.ends());
             warnings.push(format!(
                 "do not trust differences below {:.2} %: the reference {lacks} after {} samples (target {:.1} %); {remedy}",
                 100.0 * reference.resolution,
@@ -418,10 +434,27 @@ impl Run<'_> {
             orders: found.orders.clone(),
             warnings,
             shard: self.sweep.extent.shard,
+            seed: self.bench.settings.seed,
+            reference_samples: self.sweep.extent.reference_samples,
             budget_s: f64::from(self.sweep.extent.budget_s),
             took_s: m.pace.took_s(),
         }
     }
+}
+
+/// Warning about a reference with bands of wavelengths, whose pictures are priced in RGB.
+fn few_bands(reference: &Reference, rungs: &Knobs) -> Option<String> {
+    let off = match reference.off_by_bands {
+        0.0 => String::new(),
+        off => format!(", which leaves it off by {:.2} % of the range, as far as rays tell", 100.0 * off),
+    };
+    (rungs.colour.bands() > 0).then(|| {
+        format!(
+            "the reference has {} of at most {} bands of wavelengths{off}; knobs other than colour are measured in RGB",
+            rungs.colour.bands(),
+            BANDS[0]
+        )
+    })
 }
 
 fn base_task(name: &str, family: Family, knobs: &Knobs) -> Task {

@@ -7,6 +7,9 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 /// Family-wise error rate: probability that any statement of a report is wrong due to noise.
 const LEVEL: f64 = 0.01;
 
+/// Standard errors of a confidence interval to each side: about 95 % of normally distributed values.
+pub const IN_95: f64 = 2.0;
+
 /// A number with an interval: the range of measurements, or a confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
@@ -52,7 +55,7 @@ impl Estimate {
     /// Confidence interval of two standard errors (95 %), widened by the bound of the bias.
     #[must_use]
     pub fn interval(&self) -> Interval {
-        let reach = 2.0 * self.deviation + self.bias;
+        let reach = IN_95 * self.deviation + self.bias;
         Interval { median: self.mean, low: self.mean - reach, high: self.mean + reach }
     }
 

@@ -87,6 +87,11 @@ impl<'a> Sweep<'a> {
 }
 
 impl Sweep<'_> {
+    /// Seconds after which the run ends; infinite where its samples are given, so that nothing depends on the clock.
+    pub(super) fn limit_s(&self) -> f64 {
+        if self.extent.reference_samples.is_some() { f64::INFINITY } else { f64::from(self.extent.budget_s) }
+    }
+
     /// Claims the folder for this run: it must be new, or of the same interrupted run.
     pub(super) fn claim_folder(&self) -> Result<()> {
         let identity = SweepIdentity {
@@ -140,11 +145,19 @@ fn make(folder: &Path) -> Result<()> {
         .map_err(|e| anyhow::anyhow!("creating the folder {}: {}", folder.display(), file::cause(&e)))
 }
 
-/// Merges the parts of a sharded run into `folder` and evaluates all pictures against their common reference.
+/// Extent of the run that a folder holds; `None` where it holds none.
+#[must_use]
+pub fn extent_of(folder: &Path) -> Option<SweepExtent> {
+    let bytes = file::read(&folder.join("run.json")).ok()?;
+    Some(serde_json::from_slice::<SweepIdentity>(&bytes).ok()?.extent)
+}
+
+/// Merges the parts of a sharded run into `folder` and evaluates all pictures against their common reference, as the
+/// parts show them.
 ///
 /// # Errors
 /// When the folders are not the parts of one run, or when a file cannot be read or written.
-pub fn merge(parts: &[PathBuf], folder: &Path, settings: &etalon::frame::Settings) -> Result<Table> {
+pub fn merge(parts: &[PathBuf], folder: &Path) -> Result<Table> {
     let read = |part: &PathBuf| -> Result<Table> {
         let path = part.join("cost.json");
         serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))
@@ -170,7 +183,7 @@ pub fn merge(parts: &[PathBuf], folder: &Path, settings: &etalon::frame::Setting
             serde_json::from_slice(&file::read(&path)?).with_context(|| format!("reading {}", path.display()))?;
         records.push(record);
     }
-    let truth = refined.truth(settings);
+    let truth = refined.truth(&reference.view);
     let judged = Judge { truth: &truth, reference: &reference, folder }.judge(&records)?;
     table.frontier = judged.frontier;
     table.recommended = judged.recommended;

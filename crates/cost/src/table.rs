@@ -6,7 +6,9 @@ use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::statistics::Interval;
+use etalon::frame::Settings;
 use etalon::gpu::Compiled;
+use etalon::image::tone::ViewTransform;
 use etalon::plan::rungs::Indirect;
 use etalon::plan::{Knob, Knobs, Model};
 
@@ -57,6 +59,12 @@ pub struct Table {
     pub warnings: Vec<String>,
     /// Index (from 1) and number of the parts of a sharded run.
     pub shard: [u32; 2],
+    /// Random seed of the pictures.
+    #[serde(default)]
+    pub seed: u32,
+    /// Samples of the reference, if they were given instead of a budget.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference_samples: Option<u32>,
     /// Time budget in seconds.
     pub budget_s: f64,
     /// Seconds taken, without those of an interrupted run that was continued.
@@ -99,6 +107,9 @@ pub struct Reference {
     /// rays tell; a part of `resolution`, and of the intervals of errors and of their differences.
     #[serde(default)]
     pub off_by_bands: f64,
+    /// Tone curve, exposure and background of the display values that are compared.
+    #[serde(default = "usual_view")]
+    pub view: ViewTransform,
     /// Whether `resolution` is at most [`RESOLVED`].
     pub converged: bool,
     /// Pictures with different random seeds, whose mean is the reference.
@@ -109,13 +120,32 @@ pub struct Reference {
     pub image: String,
 }
 
+fn usual_view() -> ViewTransform {
+    Settings::default().view_transform()
+}
+
 impl Reference {
-    /// What keeps it from converging, and what would improve it.
+    /// Number of bands of wavelengths, 0 for RGB, and of samples.
     #[must_use]
-    pub fn shortcoming(&self) -> [&'static str; 2] {
-        // Resolution without noise (`ShownReference::resolution`).
-        if (1.0 + std::f64::consts::SQRT_2) * self.off_by_bands > RESOLVED {
+    pub fn extent(&self) -> (u32, u32) {
+        let bands = self.knobs.get("colour").and_then(|rung| rung.strip_prefix("spectral:")?.parse().ok());
+        (bands.unwrap_or(0), self.samples)
+    }
+
+    /// Whether more samples alone would not make it converge: its resolution without noise
+    /// (`ShownReference::resolution`) is above [`RESOLVED`].
+    #[must_use]
+    pub fn lacks_bands(&self) -> bool {
+        (1.0 + std::f64::consts::SQRT_2) * self.off_by_bands > RESOLVED
+    }
+
+    /// What keeps it from converging, and what would improve it. `given`: whether its samples were given, not planned.
+    #[must_use]
+    pub fn shortcoming(&self, given: bool) -> [&'static str; 2] {
+        if self.lacks_bands() {
             ["has too few bands of wavelengths", "a larger --budget draws more of them"]
+        } else if given {
+            ["is still noisy", "a larger --reference-samples improves it"]
         } else {
             ["is still noisy", "run the same command again to improve it"]
         }
@@ -358,6 +388,14 @@ pub struct Price {
 pub const INVISIBLE: f64 = 0.002;
 
 impl Price {
+    /// Whether the change costs time and buys nothing: neither less error, nor less noise, nor a visible difference.
+    #[must_use]
+    pub fn is_wasted(&self) -> bool {
+        let nearer = self.base != Family::Exact && self.error_told && self.shown_delta.median < 0.0;
+        let calmer = self.noise_ratio.is_some_and(|ratio| ratio < 1.0);
+        self.takes_longer() && !nearer && !calmer && !self.is_seen()
+    }
+
     /// Whether the change takes significantly longer than the base.
     #[must_use]
     pub fn takes_longer(&self) -> bool {

@@ -76,7 +76,7 @@ fn tiles_of_a_share_are_those_of_the_picture() {
     let bench = bench(share);
     let round = |known| Refined::round(known, &bench, &knobs, 4, &mut |_| ()).expect("a round");
     let refined = round(Some(round(None)));
-    let truth = refined.truth(&bench.settings);
+    let truth = refined.truth(&bench.settings.view_transform());
     let (_, png) = refined.describe(&truth, "", 4, &bench).expect("a reference");
     let display = decode_display(&png).expect("a picture");
     assert_eq!([display.width, display.height], bench.film_size());

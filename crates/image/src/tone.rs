@@ -5,14 +5,16 @@
 //! [`srgb_encode`] and [`quantise`] follow. Before the curve, NaN and negative samples become 0, and values above
 //! [`LARGEST`], infinity included, become [`LARGEST`]: no curve returns NaN. The caller counts such samples beforehand.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 /// Upper bound of samples before a curve: the largest finite half float (row 43 of docs/numerics.md).
 pub const LARGEST: f64 = 65504.0;
 
 /// Tone curves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, EnumMessage, IntoStaticStr, VariantArray, Serialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Default, EnumMessage, IntoStaticStr, VariantArray, Serialize, Deserialize,
+)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum ToneMap {
@@ -182,7 +184,7 @@ pub fn quantise(display: f64) -> u8 {
 }
 
 /// The mapping of radiance to display values (shaders/pass/tonemap.comp): exposure, tone curve and background.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ViewTransform {
     /// The tone curve.
     pub curve: ToneMap,

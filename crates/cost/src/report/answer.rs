@@ -63,7 +63,7 @@ pub(super) fn lead(table: &Table) -> Markup {
         @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } "."
         @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most.0) } (in_parentheses(most.1)) ": " (most.0.about()) }
         @if !table.reference.converged {
-            @let [lacks, _] = table.reference.shortcoming();
+            @let [lacks, _] = table.reference.shortcoming(table.reference_samples.is_some());
             " The " (words::link("reference", "reference")) " " (lacks) ": do not trust differences below " (percent(table.reference.resolution)) "."
         }
         @if !seen { " No knob changes this picture visibly." }
@@ -168,12 +168,18 @@ fn lost(table: &Table, point: &Point) -> Markup {
     }
 }
 
-/// Command of the report. It has no folder, which decides nothing.
+/// Command of the report, without its folder, which decides nothing, and without parts, which are joined.
 fn report_command(table: &Table) -> String {
     let [from, to] =
         [table.size, table.asked.as_ref().map_or(table.size, |asked| asked.size)].map(|[w, h]| format!("{w}x{h}"));
     let scene = table.command.replacen("etalon render", "etalon cost", 1).replacen(&from, &to, 1);
-    format!("{scene} --budget {:.0} -o FOLDER", table.budget_s)
+    let extent = match table.reference_samples {
+        Some(samples) => format!("--reference-samples {samples}"),
+        None => format!("--budget {:.0}", table.budget_s),
+    };
+    let seed = if table.seed == 0 { String::new() } else { format!(" --seed {}", table.seed) };
+    let others: String = table.others.iter().map(|other| format!(" --judge {}", other.file)).collect();
+    format!("{scene} {extent}{seed}{others} -o FOLDER")
 }
 
 /// Quality of the reference, device and warnings.
@@ -187,7 +193,7 @@ pub(super) fn trust(table: &Table) -> Markup {
                 @if r.converged {
                     "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more is significant. The difference between two pictures is known more precisely, because both are compared with the same noisy reference."
                 } @else {
-                    @let [lacks, remedy] = r.shortcoming();
+                    @let [lacks, remedy] = r.shortcoming(table.reference_samples.is_some());
                     "The " (words::link("reference", "reference")) " " (lacks) ": do not trust differences below " (percent(r.resolution)) ". The target is "
                     (plain(100.0 * RESOLVED)) " %; " (remedy) "."
                 }

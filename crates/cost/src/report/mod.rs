@@ -225,8 +225,8 @@ pub fn page(table: &Table, folder: &Path) -> Result<String> {
                 }
                 footer {
                     p {
-                        "Etalon " (table.program) ", " (table.points.len()) " pictures, " (format!("{:.0}", table.took_s)) " s of the "
-                        (format!("{:.0}", table.budget_s)) " s budget. The same numbers are in cost.json and cost.csv. Pictures are read from the folder pictures beside this page."
+                        "Etalon " (table.program) ", " (table.points.len()) " pictures, " (format!("{:.0}", table.took_s)) " s"
+                        @if table.reference_samples.is_none() { " of the " (format!("{:.0}", table.budget_s)) " s budget" } ". The same numbers are in cost.json and cost.csv. Pictures are read from the folder pictures beside this page."
                     }
                 }
                 script { (PreEscaped(SCRIPT)) }

@@ -44,7 +44,7 @@ pub(super) fn matters(table: &Table) -> Markup {
         *list = cheapest_of_each_knob(list);
         list.truncate(MOST);
     }
-    let wasted: Vec<&Price> = table.prices.iter().filter(|price| price.verdict.ends_with("wasted here")).collect();
+    let wasted: Vec<&Price> = table.prices.iter().filter(|price| price.is_wasted()).collect();
     let knobs = table.knobs.iter().filter(|knob| knob.called_for);
     let changes_error = |name: &str| better.iter().chain(&worse).chain(&undoing).any(|price| price.knob == name);
     let unseen = knobs.filter(|knob| harmless(table, &knob.knob) && !changes_error(&knob.knob));
@@ -54,7 +54,7 @@ pub(super) fn matters(table: &Table) -> Markup {
         html! {
             @if price.takes_longer() { ", takes " (time(price.gpu_ms_delta.median)) " more" }
             @else if price.saves() { ", saves " (time(-price.gpu_ms_delta.median)) }
-            @else { ", same time" }
+            @else { ", no measurable time difference" }
         }
     };
     let error = |name: &str| {
