@@ -333,9 +333,15 @@ impl ShownReference {
     pub fn resolution(&self, standard_errors: f64) -> f64 {
         let [_, deviation, _] =
             self.means(|_, _, _, squared| SquaredSums { variance: squared, ..SquaredSums::default() });
-        // The least m with m² > z σ + 2mβ + β².
-        (self.off + (2.0 * self.off * self.off + standard_errors * deviation).sqrt()).min(1.0)
+        resolved(self.off, (standard_errors * deviation).sqrt())
     }
+}
+
+/// Resolution of a reference with a bias of at most β (`off`), whose resolution by its noise alone is √(z σ): the least m
+/// with m² > z σ + 2mβ + β².
+#[must_use]
+pub(super) fn resolved(off: f64, by_noise: f64) -> f64 {
+    (off + (2.0 * off * off + by_noise * by_noise).sqrt()).min(1.0)
 }
 
 /// Mean of pictures of one size.

@@ -12,7 +12,7 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::command::{arguments, named, set};
-use super::difference::{Shown, ShownReference, Truth, in_blocks, mean_of, shown, significant};
+use super::difference::{Shown, ShownReference, Truth, in_blocks, mean_of, resolved, shown, significant};
 use super::size::{fewer, pixels, resized};
 use super::statistics::{MANY, standard_errors};
 use super::table::{RESOLVED, Reference, Round};
@@ -79,6 +79,8 @@ pub struct Pilot {
     pub plain_ms: f64,
     /// Estimated samples for the resolution [`RESOLVED`].
     pub wanted: u32,
+    /// What RGB is off, where the scene has spectra and the budget no time for bands: see [`Reference::off_by_bands`].
+    pub off_in_rgb: f64,
     /// Warnings for the report.
     pub warnings: Vec<String>,
 }
@@ -192,6 +194,14 @@ struct Look {
     wanted: f64,
 }
 
+impl Look {
+    /// Resolution of a reference drawn in `limit_ms`, with a bias of at most `off`; 1 where there is no time for one.
+    fn resolves(&self, off: f64, limit_ms: f64) -> f64 {
+        let samples = limit_ms / self.each_ms;
+        if samples < f64::from(LEAST_SAMPLES) { 1.0 } else { resolved(off, RESOLVED * (self.wanted / samples).sqrt()) }
+    }
+}
+
 fn look(bench: &Bench<'_>, colour: &str) -> Result<Look> {
     let knobs = set(&set(&Knobs::exact(), "samples", &PILOT.to_string())?, "colour", colour)?;
     // Compile first, so that the time of a sample does not contain it.
@@ -224,13 +234,15 @@ impl Pilot {
         let plain = look(bench, "rgb")?;
         let by_wavelength = called_for && told_by_wavelength(bench);
         // Spectral rendering has its own programs, which must be compiled too.
-        let mut has_time = BANDS_TAKE * begun.elapsed().as_secs_f64() * 1e3 < PILOT_SHARE * budget_ms;
+        let has_time = BANDS_TAKE * begun.elapsed().as_secs_f64() * 1e3 < PILOT_SHARE * budget_ms;
         let bands = if by_wavelength && has_time { Some(look(bench, "spectral:8")?) } else { None };
-        let mut seen = bands.filter(|bands| differ(bench, &plain.parts, &bands.parts));
+        let off_in_rgb = bands.as_ref().and_then(|bands| difference(bench, &plain.parts, &bands.parts));
         let most = if may_shrink { 1.0 } else { pixels(asked) / pixels(few) };
-        if seen.as_ref().is_some_and(|bands| f64::from(LEAST_SAMPLES) * bands.each_ms * most > share * budget_ms) {
-            (seen, has_time) = (None, false);
-        }
+        let share_ms = share * budget_ms / most;
+        let pays =
+            |bands: &Look| off_in_rgb.is_some_and(|off| bands.resolves(0.0, share_ms) < plain.resolves(off, share_ms));
+        let seen = bands.filter(pays);
+        let off_in_rgb = if seen.is_some() { 0.0 } else { off_in_rgb.unwrap_or(0.0) };
 
         let reference_ms = f64::from(FEWEST_SAMPLES) * seen.as_ref().unwrap_or(&plain).each_ms;
         let fits = |size: &[u32; 2]| {
@@ -245,12 +257,20 @@ impl Pilot {
         let plain_ms = more * plain.each_ms;
         let rungs = |colour: &str| set(&Knobs::exact(), "colour", colour);
         let Some(seen) = seen else {
-            let same = "spectral rendering changes nothing significant in this picture: the reference is drawn in RGB";
-            let short = "the budget has no time for spectral rendering, although the scene has spectra: the reference is drawn in RGB";
-            let why = if by_wavelength && !has_time { short } else { same };
-            let warnings = if called_for { vec![why.to_owned()] } else { Vec::new() };
-            let knobs = rungs("rgb")?;
-            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted: wanted(&plain), warnings });
+            let why = if by_wavelength && !has_time {
+                "the budget has no time for spectral rendering, although the scene has spectra".to_owned()
+            } else if off_in_rgb > 0.0 {
+                format!(
+                    "spectral rendering changes this picture by up to {:.1} % of the range, as far as {PILOT} samples tell, and would \
+                     leave more noise in this budget",
+                    100.0 * off_in_rgb
+                )
+            } else {
+                "spectral rendering changes nothing significant in this picture".to_owned()
+            };
+            let warnings = if called_for { vec![format!("{why}: the reference is drawn in RGB")] } else { Vec::new() };
+            let (knobs, wanted) = (rungs("rgb")?, wanted(&plain));
+            return Ok(Self { size, knobs, each_ms: plain_ms, plain_ms, wanted, off_in_rgb, warnings });
         };
         let each_ms = |bands: u32| more * seen.each_ms * f64::from(bands) / 8.0;
         let affordable = |bands: &u32| samples_within(each_ms(*bands), share * budget_ms) >= FEWEST_SAMPLES;
@@ -258,7 +278,7 @@ impl Pilot {
         // Each band has its own random numbers.
         let wanted = (wanted(&seen) * 8).div_ceil(bands).max(FEWEST_SAMPLES);
         let knobs = rungs(&format!("spectral:{bands}"))?;
-        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, warnings: Vec::new() })
+        Ok(Self { size, knobs, each_ms: each_ms(bands), plain_ms, wanted, off_in_rgb, warnings: Vec::new() })
     }
 }
 
@@ -283,27 +303,30 @@ pub fn off_by_bands(bench: &Bench<'_>, bands: u32) -> Result<f64> {
     Ok((squares.sum::<f64>() / (3 * few.len().max(1)) as f64).sqrt())
 }
 
-/// Whether the difference of two pictures is significant.
-fn differ(bench: &Bench<'_>, a: &Parts, b: &Parts) -> bool {
+/// Upper end of the root mean square difference of two pictures in display values, in the smallest blocks where it is
+/// significant; `None` where it is not.
+fn difference(bench: &Bench<'_>, a: &Parts, b: &Parts) -> Option<f64> {
     let (view, size) = (bench.settings.view_transform(), bench.film_size());
     let halves = |parts: &Parts| -> [Shown; 2] { [0, 1].map(|odd| shown(&half(parts, odd), &view)) };
     let enough = standard_errors(3, MANY);
-    significant(&in_blocks(&halves(a), &halves(b), size[0] as usize), enough)
-        .is_some_and(|(_, found)| found.is_above(enough))
+    let (_, found) = significant(&in_blocks(&halves(a), &halves(b), size[0] as usize), enough)?;
+    found.is_above(enough).then(|| found.interval().high.sqrt())
 }
 
 impl Refined {
     /// The same with [`Reference::off_by_bands`], if it has fewer bands of wavelengths than the most. It is measured in
-    /// a picture of the pilot's size.
+    /// a picture of the pilot's size; that of RGB is known from the pilot.
     ///
     /// # Errors
     /// When a picture cannot be drawn.
-    pub fn aware_of_bands(self, bench: &Bench<'_>) -> Result<Self> {
-        let bands = self.knobs.colour.bands();
-        if bands == 0 || bands == BANDS[0] || self.off_by_bands > 0.0 {
-            return Ok(self);
-        }
-        Ok(Self { off_by_bands: off_by_bands(&resized(bench, pilot_size(bench)), bands)?, ..self })
+    pub fn aware_of_bands(self, bench: &Bench<'_>, off_in_rgb: f64) -> Result<Self> {
+        let off_by_bands = match self.knobs.colour.bands() {
+            _ if self.off_by_bands > 0.0 => return Ok(self),
+            0 => off_in_rgb,
+            bands if bands == BANDS[0] => 0.0,
+            bands => off_by_bands(&resized(bench, pilot_size(bench)), bands)?,
+        };
+        Ok(Self { off_by_bands, ..self })
     }
 
     /// Draws one more round of `samples` samples, after the rounds of `known`. Without one the reference is not
@@ -523,4 +546,22 @@ pub fn refine(
         each_s = begun.elapsed().as_secs_f64() / f64::from(samples);
     }
     Ok(known)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture whose colours differ by 1 % of the range between RGB and bands, and bands are twelve times as dear:
+    /// they pay where there is time for so many samples that noise is less than that.
+    #[test]
+    fn bands_pay_where_noise_is_less_than_their_difference() {
+        let look = |each_ms: f64, wanted: f64| Look { parts: Parts::new(), each_ms, wanted };
+        let (plain, bands) = (look(10.0, 400.0), look(120.0, 400.0));
+        let pays = |limit_ms: f64| bands.resolves(0.0, limit_ms) < plain.resolves(0.01, limit_ms);
+        assert!(!pays(300.0) && !pays(1_000.0) && pays(10_000.0) && pays(f64::INFINITY));
+        // No time for four samples, and no noise at all.
+        assert_eq!(bands.resolves(0.0, 400.0), 1.0);
+        assert_eq!(bands.resolves(0.0, f64::INFINITY), 0.0);
+    }
 }

@@ -115,7 +115,7 @@ impl Run<'_> {
             Some(known) => known,
             None => self.first_round(&m.pace, listener)?,
         };
-        let mut refined = refined.aware_of_bands(bench)?;
+        let mut refined = refined.aware_of_bands(bench, pilot.off_in_rgb)?;
         let rungs = refined.knobs().clone();
         let priced = reference_samples.map(|samples| if samples >= 256 { 16 } else { 4 });
         let each = [pilot.each_ms, pilot.plain_ms];

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
+use super::difference::resolved;
 use super::statistics::Interval;
 use etalon::frame::Settings;
 use etalon::gpu::Compiled;
@@ -104,7 +105,8 @@ pub struct Reference {
     /// Resolution: least error of display values 0 to 1 that is significant.
     pub resolution: f64,
     /// Root mean square, in display values 0 to 1, by which fewer bands of wavelengths than the most are off, as far as
-    /// rays tell; a part of `resolution`, and of the intervals of errors and of their differences.
+    /// rays tell, or RGB, as far as the pilot tells; a part of `resolution`, and of the intervals of errors and of their
+    /// differences.
     #[serde(default)]
     pub off_by_bands: f64,
     /// Tone curve, exposure and background of the display values that are compared.
@@ -132,11 +134,10 @@ impl Reference {
         (bands.unwrap_or(0), self.samples)
     }
 
-    /// Whether more samples alone would not make it converge: its resolution without noise
-    /// (`ShownReference::resolution`) is above [`RESOLVED`].
+    /// Whether more samples alone would not make it converge: its resolution without noise is above [`RESOLVED`].
     #[must_use]
     pub fn lacks_bands(&self) -> bool {
-        (1.0 + std::f64::consts::SQRT_2) * self.off_by_bands > RESOLVED
+        resolved(self.off_by_bands, 0.0) > RESOLVED
     }
 
     /// What keeps it from converging, and what would improve it. `given`: whether its samples were given, not planned.
