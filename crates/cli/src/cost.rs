@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 use clap::Args;
 
 use super::budget::{command, keep, kept};
@@ -14,10 +14,9 @@ use super::interrupt::Interrupt;
 use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions, shard};
 use super::print;
 use super::progress::{ProgressForm, Steps};
-use super::setup::Setup;
+use super::setup::{Setup, validated};
 use super::usage;
 use etalon::frame::Settings;
-use etalon::gpu::Severity;
 use etalon::image::file;
 use etalon::image::metric::AnyPicture;
 use etalon::scene::Prune;
@@ -146,7 +145,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
         args.picture.colour_of(setup.opened.scene(), &mut knobs)?;
         let compared = setup.bench(&args.scene, settings, |bench| compare_rungs(&bench, &knobs, wanted))?;
         drop(steps);
-        validated(&setup)?;
+        validated(&setup.device)?;
         if let Some(folder) = &args.output {
             std::fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
             let [a, b] = compared.rungs.map(|rung| format!("{}-{}", compared.knob, rung.replace(':', "-")));
@@ -196,7 +195,7 @@ pub fn run(args: &CostArgs, quiet: bool) -> Result<ExitCode> {
             return Err(error);
         }
     };
-    validated(&setup)?;
+    validated(&setup.device)?;
     let done = write(args, &output, &table)?;
     if args.shard.is_none() {
         keep(&table.command, &setup, &output);
@@ -260,14 +259,6 @@ fn beside(args: &CostArgs, folders: [&PathBuf; 2]) -> Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// Fails the run on an error of the validation layer.
-fn validated(setup: &Setup) -> Result<()> {
-    match setup.device.messages().into_iter().find(|message| message.severity == Severity::Error) {
-        Some(message) => bail!("validation: {}", message.text),
-        None => Ok(()),
-    }
 }
 
 /// Prints a line for each rung and a verdict.

@@ -8,6 +8,7 @@ use comfy_table::{Table, presets};
 use serde_json::json;
 
 use super::options::DeviceOptions;
+use super::setup::validated;
 use super::{print, usage};
 use etalon::gpu::Device;
 use etalon::optics::{Case, Tier, ulp};
@@ -57,6 +58,7 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
     for tier in Tier::ALL {
         tiers.push((tier, evaluate(&device, entry.probe, tier, &row, 1)?.outputs));
     }
+    validated(&device)?;
     let outputs = entry.equation.outputs;
     let allowed = |tier: Tier, column: usize| {
         (outputs[column].allowed)(&Case { tier, inputs: &row, exact: &cases.exact, column })

@@ -8,7 +8,9 @@ use clap::{Args, Parser, Subcommand};
 use serde_json::Value;
 
 use super::choices::one_of;
-use super::picture::{RenderArgs, default_stem};
+use super::picture::{RenderArgs, default_stem, differs, format_of};
+use super::sequence::wanted;
+use super::shard::only_output;
 use super::{print, usage};
 use etalon::image::file;
 use etalon_farm::account::{Account, Shift};
@@ -76,6 +78,18 @@ struct ReportArgs {
     output: PathBuf,
 }
 
+impl JobArgs {
+    /// Refuses a folder for engines whose files name none.
+    fn check_folder(&self) -> Result<()> {
+        let is_named = !matches!(self.engine, Engine::Slurm | Engine::Hyperqueue | Engine::Kubernetes);
+        ensure!(
+            self.here.is_none() || is_named,
+            "--here: tasks of this engine run where the job file says or is submitted"
+        );
+        Ok(())
+    }
+}
+
 /// The command line of `render`, to parse its arguments the same way.
 #[derive(Parser)]
 #[command(name = "etalon render", no_binary_name = true)]
@@ -97,6 +111,7 @@ pub fn run(args: &FarmArgs) -> Result<ExitCode> {
 }
 
 fn write_report(args: &ReportArgs) -> Result<()> {
+    usage(args.files.iter().try_for_each(|file| differs("--output", &args.output, file)))?;
     file::check_writable(&args.output)?;
     let mut shifts = Vec::new();
     for path in &args.files {
@@ -152,11 +167,23 @@ fn rendering(arguments: &[String]) -> Result<RenderArgs> {
         is_still || !render.output.iter().any(|path| path.extension().is_some_and(|e| e == "apng")),
         "--output: one process makes an animated preview from all frames; when they are drawn, run `etalon render` itself once more"
     );
+    ensure!(!render.keep, "--keep: a task that is ended keeps what it has drawn; leave this option out");
+    if is_still {
+        ensure!(sequence.fps.is_none(), "--fps: the command draws no frames; add --frames or --turntable");
+        ensure!(render.format.is_none(), "--format: parts are joined to .png and .exr; leave this option out");
+        render.output.iter().try_for_each(|path| format_of(path).map(|_| ()))?;
+        // What a task is given: a share, and one file for its part.
+        let part = RenderArgs { output: vec![PathBuf::from("1.part")], ..render.clone() };
+        only_output(&part, [1, 1], &render.render_settings()?)?;
+    } else {
+        wanted(&render)?;
+    }
     Ok(render)
 }
 
 fn write_job(args: &JobArgs) -> Result<()> {
     let render = usage(rendering(&args.arguments))?;
+    usage(args.check_folder())?;
     args.output.iter().try_for_each(|path| file::check_writable(path))?;
     let settings = render.render_settings()?;
     let frames = match (&render.sequence.frames, render.sequence.turntable) {

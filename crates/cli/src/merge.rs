@@ -9,8 +9,9 @@ use clap::{Args, ValueEnum as _};
 use serde::Serialize;
 
 use super::options::DeviceOptions;
-use super::picture::{AovName, Format, are_same, format_of, layer_between};
+use super::picture::{AovName, Format, are_same, differs, format_of, layer_between};
 use super::report::{WorkFacts, WrittenFile};
+use super::setup::validated;
 use super::shard::display_settings;
 use super::{print, usage};
 use etalon::frame::shown;
@@ -68,6 +69,10 @@ impl MergeArgs {
             ensure!(!is_named, "--output {}: this file is named twice", path.display());
             outputs.push((path, format));
         }
+        if let Some(report) = &self.report {
+            let others = self.parts.iter().chain(&self.output);
+            others.into_iter().try_for_each(|other| differs("--report", report, other))?;
+        }
         Ok(outputs)
     }
 }
@@ -92,7 +97,9 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
                 joined.identity.device.join(", "),
                 here.join(", ")
             );
-            Some(shown(&device, &joined.film, &settings, joined.bands > 0)?)
+            let display = shown(&device, &joined.film, &settings, joined.bands > 0)?;
+            validated(&device)?;
+            Some(display)
         }
         false => None,
     };

@@ -36,7 +36,7 @@ pub struct SequenceOptions {
     pub fps: Option<f64>,
     /// Turn the camera around --target, or the middle of the scene, by 1/N of a circle per frame; the animation stands
     /// still unless --fps is given [default frames: 0 to N - 1]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub turntable: Option<u32>,
     /// Draw from these cameras of the file, by name or index, or from all of them. Each output name contains the camera
     /// name as {camera}
@@ -48,7 +48,7 @@ pub struct SequenceOptions {
     pub shard: Option<[u32; 2]>,
     /// How to divide a single picture: by tiles of pixels, or by samples into at most 64 parts
     /// [default: tiles; samples if the plan uses screen-space reflection or refraction]
-    #[arg(long, value_enum, value_name = "tiles|samples", requires = "shard")]
+    #[arg(long, value_enum, value_name = "tiles|samples")]
     pub split: Option<SplitBy>,
 }
 
@@ -75,6 +75,16 @@ impl SequenceOptions {
     #[must_use]
     pub fn is_sequence(&self) -> bool {
         self.frames.is_some() || self.turntable.is_some() || !self.cameras.is_empty()
+    }
+
+    /// Refuses options about sequences for one picture.
+    ///
+    /// # Errors
+    /// One sentence with the option.
+    pub(super) fn check_one(&self) -> Result<()> {
+        ensure!(self.fps.is_none(), "--fps: the command draws no frames; add --frames or --turntable");
+        ensure!(self.split.is_none() || self.shard.is_some(), "--split: the picture is not divided; add --shard I/N");
+        Ok(())
     }
 }
 
@@ -243,6 +253,15 @@ pub(super) fn are_same(a: &Path, b: &Path) -> bool {
     a == b || whole(a).zip(whole(b)).is_some_and(|(a, b)| a == b)
 }
 
+/// Refuses a file that an option writes and that has another use in the same command.
+///
+/// # Errors
+/// When both paths name one file.
+pub(super) fn differs(option: &str, path: &Path, other: &Path) -> Result<()> {
+    ensure!(!are_same(path, other), "{option} {}: the command reads or writes this file already", path.display());
+    Ok(())
+}
+
 /// File format of an output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
@@ -357,8 +376,12 @@ fn blank(display: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// Refuses layers of half buffers for pictures without half buffers.
-pub(super) fn check_halves(names: &[AovName], settings: &Settings) -> Result<()> {
+/// Refuses layers that are named twice, and those of half buffers for pictures without half buffers.
+pub(super) fn check_layers(names: &[AovName], settings: &Settings) -> Result<()> {
+    if let Some((_, name)) = names.iter().enumerate().find(|(place, name)| names[..*place].contains(name)) {
+        let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+        bail!("--aov {name}: this layer is named twice");
+    }
     if let Some(name) = names.iter().find(|name| name.of_halves()) {
         let name = name.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
         if settings.knobs.indirect != Indirect::Path {

@@ -11,7 +11,7 @@ use comfy_table::{ContentArrangement, Table, presets};
 
 use super::options::{DeviceOptions, PictureOptions, PlanExtent as Planned, SceneOptions};
 use super::report::{Expected, PipelineFact, PlanFacts};
-use super::setup::{self, Setup};
+use super::setup::{self, Setup, validated};
 use super::{extensions, heading, print, usage};
 use etalon::frame::{Renderer, Settings};
 use etalon::open::Opened;
@@ -100,8 +100,9 @@ pub fn run(args: &PlanArgs, whole: bool) -> Result<ExitCode> {
 impl PlanArgs {
     /// Refuses options about a picture: files of a folder are only read.
     fn check_folder(&self) -> Result<()> {
-        let PictureOptions { set, model, max_error, plan, .. } = &self.picture;
+        let PictureOptions { set, model, max_error, plan, seed, .. } = &self.picture;
         let is_plain = set.is_empty() && model.is_none() && max_error.is_none() && *plan == Planned::Scene;
+        let is_plain = is_plain && *seed == 0 && self.picture.words().len() == 1;
         let is_alone = self.scene.words().len() == 1 && self.device.device.is_none() && !self.device.validate;
         ensure!(
             is_plain && is_alone && !self.forecast,
@@ -148,6 +149,7 @@ fn on_device(
     mut warnings: Vec<String>,
 ) -> Result<PlanFacts> {
     let interfaces = settings.knobs.interfaces.count();
+    let device = setup.device.clone();
     let explained = (args.picture.plan == Planned::ExplainCost).then(|| (setup.clone(), settings.clone()));
     let forecast = args.forecast.then(|| (setup.clone(), settings.clone()));
     let (mut renderer, camera) = setup.renderer(&args.scene, settings)?;
@@ -188,6 +190,7 @@ fn on_device(
             eprintln!("measuring the cost of \"{effect}\"");
         })?;
     }
+    validated(&device)?;
     Ok(facts)
 }
 

@@ -8,6 +8,7 @@ use clap::Args;
 
 use super::choices::one_of;
 use super::options::DeviceOptions;
+use super::setup::validated;
 use super::{print, usage};
 use etalon::gpu::Device;
 use etalon::image::file;
@@ -127,7 +128,7 @@ fn checked(args: &PlotArgs, output: &Path) -> Result<Plot> {
     };
     let over = over(&args.over)?;
     ensure!(!args.log || over.range[0] > 0.0, "--log: the range of --over has to begin above 0");
-    Ok(Plot {
+    let plot = Plot {
         entry,
         column: of,
         over,
@@ -139,7 +140,9 @@ fn checked(args: &PlotArgs, output: &Path) -> Result<Plot> {
         tier: args.tier,
         log: args.log,
         error: args.error,
-    })
+    };
+    plot.check_names()?;
+    Ok(plot)
 }
 
 /// Runs the command.
@@ -153,6 +156,7 @@ pub fn run(args: &PlotArgs) -> Result<ExitCode> {
     file::check_writable(&output)?;
     let device = Device::open(&args.device.choice(), args.device.validate)?;
     let drawn = plot.draw(&device)?;
+    validated(&device)?;
     file::write(&output, drawn.svg.as_bytes())?;
     for curve in &drawn.differences {
         let worst = curve.points.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));

@@ -14,8 +14,8 @@ use super::exposure;
 use super::interrupt::{INTERRUPTED, Interrupt};
 use super::options::{DeviceOptions, PlanExtent};
 use super::picture::{
-    Format, RenderArgs, are_same, check_halves, check_same_scene, default_stem, format_of, is_standard, layers,
-    metadata, output_format, scene_text, settings_size, warn_about,
+    Format, RenderArgs, are_same, check_layers, check_same_scene, default_stem, differs, format_of, is_standard,
+    layers, metadata, output_format, scene_text, settings_size, warn_about,
 };
 use super::plan::cost_table;
 use super::progress::{ProgressForm, Steps};
@@ -55,7 +55,8 @@ impl Phases {
 pub fn run(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut printed = BTreeSet::new();
     match draw_any(args, quiet, &mut printed) {
-        Err(error) if is_lost(&error) => {
+        // Standard input can be read only once.
+        Err(error) if is_lost(&error) && args.scene.scene != "-" => {
             // Frames whose files are complete are not drawn again.
             let what = if args.sequence.is_sequence() { "what is missing" } else { "the picture" };
             tracing::warn!("{error:#}; {what} is drawn once more, in short submissions");
@@ -83,8 +84,9 @@ fn draw(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     let mut phases =
         Phases { start: now, last: now, all: BTreeMap::from(["bvh", "pipelines"].map(|name| (name, 0.0))) };
     let mut settings = args.render_settings()?;
+    usage(args.sequence.check_one())?;
     let budget = usage(Budget::of(args.within, &args.picture))?;
-    usage(check_halves(&args.aov, &settings))?;
+    usage(check_layers(&args.aov, &settings))?;
     let outputs = outputs(args)?;
     let steps = Steps::new(args.progress, quiet);
     phases.end("start");
@@ -286,8 +288,16 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
     if !args.aov.is_empty() && !all.iter().any(|(_, format)| *format == Format::Exr) {
         return usage(Err(anyhow!("--aov: layers are written to an EXR; add -o FILE.exr")));
     }
-    let files = all.iter().map(|(path, _)| path).filter(|path| !is_standard(path));
-    files.chain(&args.report).try_for_each(|path| file::check_writable(path))?;
+    let files = || all.iter().map(|(path, _)| path).filter(|path| !is_standard(path));
+    let environment = args.scene.env.as_ref().map(PathBuf::from);
+    let check = || -> Result<()> {
+        files()
+            .chain(&args.report)
+            .try_for_each(|path| environment.iter().try_for_each(|env| differs("--env", env, path)))?;
+        args.report.iter().try_for_each(|report| files().try_for_each(|path| differs("--report", report, path)))
+    };
+    usage(check())?;
+    files().chain(&args.report).try_for_each(|path| file::check_writable(path))?;
     Ok(all)
 }
 

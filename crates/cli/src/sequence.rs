@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::exposure::{self, ExposureFacts};
 use super::options::{PlanExtent, SceneOptions};
 use super::picture::{
-    Format, RenderArgs, check_halves, check_same_scene, default_stem, format_of, layers, metadata, scene_text,
+    Format, RenderArgs, check_layers, check_same_scene, default_stem, differs, format_of, layers, metadata, scene_text,
     settings_size, warn_about,
 };
 use super::progress::Steps;
@@ -66,7 +66,7 @@ struct PictureRecord {
 }
 
 /// The parsed options of a sequence, before the scene is read.
-struct SequenceRequest {
+pub(super) struct SequenceRequest {
     frames: Vec<i32>,
     moves: bool,
     turns: Option<u32>,
@@ -76,7 +76,7 @@ struct SequenceRequest {
 }
 
 /// Checks all options that can be checked before any work is done.
-fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
+pub(super) fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
     let options = &args.sequence;
     ensure!(args.repeat == 1, "--repeat draws one picture again; it does not work with a sequence");
     ensure!(args.within.is_none(), "--within chooses rungs for one picture; for a sequence choose rungs with --set");
@@ -86,6 +86,7 @@ fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
     ensure!(fps.is_finite() && fps > 0.0, "--fps {fps}: expected a number above 0");
     let moves = options.frames.is_some() && (options.turntable.is_none() || options.fps.is_some())
         || options.turntable.is_some() && options.fps.is_some();
+    ensure!(options.split.is_none(), "--split: a sequence is divided by pictures; leave this option out");
     ensure!(options.fps.is_none() || moves, "--fps: the command draws no frames; add --frames or --turntable");
     let all = match (&options.frames, options.turntable) {
         (Some(frames), _) => frames.clone(),
@@ -146,20 +147,38 @@ fn wanted(args: &RenderArgs) -> Result<SequenceRequest> {
 
 /// Checks that the outputs can be written.
 fn check_writable(args: &RenderArgs, request: &SequenceRequest) -> Result<()> {
-    let unnamed = [String::new()];
-    for (pattern, _) in &request.outputs {
-        let cameras = &args.sequence.cameras;
-        for camera in if cameras.is_empty() { &unnamed[..] } else { cameras } {
-            for &frame in request.frames.iter().take(1).chain(request.frames.last()) {
-                let path = pattern.path(frame, camera);
-                if args.output.is_empty() {
-                    check_same_scene(&path, &args.scene.scene)?;
-                }
-                file::check_writable(&path)?;
-            }
-        }
+    if args.sequence.cameras.is_empty() {
+        check_pictures(args, request, &[""])?;
+    }
+    if let (Some(report), Some(preview)) = (&args.report, &request.preview) {
+        usage(differs("--report", report, preview))?;
     }
     request.preview.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))
+}
+
+/// Checks the files of all pictures from cameras of these names: each is another file, that can be written.
+fn check_pictures(args: &RenderArgs, request: &SequenceRequest, cameras: &[&str]) -> Result<()> {
+    let mut all = BTreeSet::new();
+    for (pattern, _) in &request.outputs {
+        for (&camera, &frame) in
+            cameras.iter().flat_map(|camera| request.frames.iter().map(move |frame| (camera, frame)))
+        {
+            let path = pattern.path(frame, camera);
+            usage(args.report.iter().try_for_each(|report| differs("--report", report, &path)))?;
+            if args.output.is_empty() {
+                check_same_scene(&path, &args.scene.scene)?;
+            }
+            // Of many frames in one folder the first and the last tell whether they can be written.
+            if Some(&frame) == request.frames.first() || Some(&frame) == request.frames.last() {
+                file::check_writable(&path)?;
+            }
+            let is_new = all.insert(path.clone());
+            let twice =
+                || anyhow!("--cameras: two pictures would be written to {}; name the cameras by index", path.display());
+            usage(if is_new { Ok(()) } else { Err(twice()) })?;
+        }
+    }
+    Ok(())
 }
 
 /// The camera rotated about the axis `up` through `center` by the fraction `part` of a full turn.
@@ -175,21 +194,23 @@ fn cameras(options: &SceneOptions, names: &[String], scene: &Scene, size: [u32; 
         return Ok(vec![(String::new(), options.choose_camera(scene, size)?)]);
     }
     let all: Vec<String> = match names {
-        [all] if all == "all" => (0..scene.cameras.len()).map(|index| index.to_string()).collect(),
+        [all] if all == "all" => scene.camera_keys(),
         names => names.to_vec(),
     };
     ensure!(!all.is_empty(), "--cameras all: {} has no cameras", scene.name);
-    let of = |name: &String| -> Result<(String, Camera)> {
-        let chosen = SceneOptions { camera: Some(name.clone()), ..options.clone() };
+    let keys = scene.camera_keys();
+    let of = |word: &String| -> Result<(String, Camera)> {
+        let chosen = SceneOptions { camera: Some(word.clone()), ..options.clone() };
         let camera = chosen.choose_camera(scene, size)?;
-        Ok((if camera.name.is_empty() { name.clone() } else { camera.name.clone() }, camera))
+        // Files are named by the key, which is the name unless two cameras share it.
+        let known = scene.camera(word);
+        let key =
+            scene.cameras.iter().zip(&keys).find(|(camera, _)| known.is_some_and(|known| std::ptr::eq(known, *camera)));
+        Ok((key.map_or(word, |(_, key)| key).clone(), camera))
     };
     let found: Vec<(String, Camera)> = all.iter().map(of).collect::<Result<_>>()?;
     for (place, (name, _)) in found.iter().enumerate() {
-        ensure!(
-            found[..place].iter().all(|(other, _)| other != name),
-            "--cameras: two cameras are called \"{name}\" and would write the same file; name them by index"
-        );
+        ensure!(found[..place].iter().all(|(other, _)| other != name), "--cameras: camera \"{name}\" is named twice");
     }
     Ok(found)
 }
@@ -220,7 +241,7 @@ fn holds(path: &Path, format: Format, picture: &str) -> Option<(Vec<u8>, Option<
 pub fn run(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> Result<ExitCode> {
     let begun = Instant::now();
     let mut settings = args.render_settings()?;
-    usage(check_halves(&args.aov, &settings))?;
+    usage(check_layers(&args.aov, &settings))?;
     let wanted = usage(wanted(args))?;
     check_writable(args, &wanted)?;
     let steps = Steps::new(args.progress, quiet);
@@ -254,6 +275,10 @@ pub fn run(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> R
         }
         _ => cameras(&args.scene, names, &still, settings.size)?,
     };
+    if !names.is_empty() {
+        let names: Vec<&str> = fixed.iter().map(|(name, _)| name.as_str()).collect();
+        check_pictures(args, &wanted, &names)?;
+    }
     let base_time = args.scene.time.0;
     // All pictures have the exposure of the scene at --time from the first camera, whichever of them are drawn here.
     let first = fixed.first().map(|(_, camera)| camera).ok_or_else(|| anyhow!("{}: no camera", still.name))?;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, bail};
 
 use super::is_certain;
 use super::options::{DeviceOptions, SceneOptions};
 use etalon::frame::{Renderer, Settings};
-use etalon::gpu::Device;
+use etalon::gpu::{Device, Severity};
 use etalon::open::Opened;
 use etalon::plan::Effect;
 use etalon::scene::environment::Environment;
@@ -81,6 +81,14 @@ fn open_beside<T>(device: &DeviceOptions, scene: &SceneOptions, load: impl FnOnc
         let join = |_| anyhow!("a loading thread failed");
         Ok((device.join().map_err(join)?, loaded, environment.join().map_err(join)?))
     })
+}
+
+/// Fails the command on an error of the validation layer.
+pub(super) fn validated(device: &Device) -> Result<()> {
+    match device.messages().into_iter().find(|message| message.severity == Severity::Error) {
+        Some(message) => bail!("validation: {}", message.text),
+        None => Ok(()),
+    }
 }
 
 impl Setup {

@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result, bail, ensure};
 
 use super::exposure;
 use super::options::PlanExtent;
-use super::picture::{RenderArgs, check_halves, is_standard, layers};
+use super::picture::{RenderArgs, check_layers, is_standard, layers};
 use super::progress::Steps;
 use super::report::Validation;
 use super::setup::Setup;
@@ -44,7 +44,7 @@ fn split(args: &RenderArgs, plan: &Plan) -> Result<Split> {
 }
 
 /// The output of a part, after a check of the options that are about whole pictures.
-fn only_output<'a>(args: &'a RenderArgs, [index, of]: [u32; 2], settings: &Settings) -> Result<&'a PathBuf> {
+pub(super) fn only_output<'a>(args: &'a RenderArgs, [index, of]: [u32; 2], settings: &Settings) -> Result<&'a PathBuf> {
     ensure!(args.repeat == 1, "--repeat does not work with --shard: a part of a picture is drawn once");
     ensure!(args.within.is_none(), "--within chooses rungs for one process; with --shard choose rungs with --set");
     ensure!(args.picture.plan != PlanExtent::ExplainCost, "--plan explain-cost works with a whole picture only");
@@ -56,7 +56,7 @@ fn only_output<'a>(args: &'a RenderArgs, [index, of]: [u32; 2], settings: &Setti
         bail!("--shard {index}/{of}: name the one file of this part with -o, for example -o {index}.part")
     };
     ensure!(!is_standard(output), "--output -: a part is continued from its file; name one");
-    check_halves(&args.aov, settings)?;
+    check_layers(&args.aov, settings)?;
     ensure!(
         settings.max_error.is_none(),
         "--max-error: a process that draws a part does not know the error of the whole picture; choose --set samples"
@@ -72,6 +72,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     let begun = Instant::now();
     let [index, of] = shard;
     let mut settings = args.render_settings()?;
+    usage(args.sequence.check_one())?;
     let output = usage(only_output(args, shard, &settings))?;
     file::check_writable(output)?;
     let stopped = Arc::new(AtomicBool::new(false));

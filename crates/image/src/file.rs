@@ -36,8 +36,11 @@ impl std::error::Error for Failed {}
 /// Whether an error means a full disk or an exceeded quota: a later attempt may succeed.
 #[must_use]
 pub fn is_full(error: &anyhow::Error) -> bool {
-    let full = |error: &Failed| matches!(error.0.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
-    error.chain().any(|cause| cause.downcast_ref().is_some_and(full))
+    let full = |error: &io::Error| matches!(error.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
+    let of = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref::<Failed>().map(|failed| full(&failed.0)).or_else(|| cause.downcast_ref().map(full))
+    };
+    error.chain().filter_map(of).any(|is_full| is_full)
 }
 
 /// Reads the content of `path`; the error is one sentence.
@@ -94,6 +97,11 @@ pub fn check_writable(path: &Path) -> Result<()> {
         match fs::metadata(path) {
             Ok(found) => {
                 ensure!(!found.is_dir(), "it is a folder");
+                // Whoever reads a pipe would see its end.
+                #[cfg(unix)]
+                if std::os::unix::fs::FileTypeExt::is_fifo(&found.file_type()) {
+                    return Ok(());
+                }
                 OpenOptions::new().write(true).open(path).map_err(|error| anyhow!(cause(&error)))?;
                 if found.is_file() {
                     beside(&fs::canonicalize(path).map_err(|error| anyhow!(cause(&error)))?)?;

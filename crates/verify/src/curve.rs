@@ -162,6 +162,27 @@ impl Plot {
         Ok(points.filter(|(_, y)| y.is_finite()).collect())
     }
 
+    /// Checks the names of all inputs, without a device.
+    ///
+    /// # Errors
+    /// One sentence with the first name that is no input, or that is given twice.
+    pub fn check_names(&self) -> Result<()> {
+        let each = self.each.as_ref().map(|(name, _)| ("--each", name));
+        let mut known = arguments::names(&self.entry);
+        known.extend(self.entry.probe.inputs.iter().map(|&column| column.to_owned()));
+        if !self.metals.is_empty() {
+            known.push("wavelength".to_owned());
+        }
+        for (option, name) in [("--over", &self.over.name)].into_iter().chain(each) {
+            let has = arguments::names(&self.entry).join(", ");
+            ensure!(known.contains(name), "{option} {name}: the inputs of {} are {has}", self.entry.probe.name);
+            ensure!(!self.values.contains_key(name), "{name}={}: {option} gives this input", self.values[name]);
+        }
+        let is_twice = each.is_some_and(|(_, name)| *name == self.over.name);
+        ensure!(!is_twice, "--each {}: --over gives this input", self.over.name);
+        Ok(())
+    }
+
     /// Evaluates and draws.
     ///
     /// # Errors
