@@ -292,6 +292,7 @@ impl Renderer {
     pub fn begin(&mut self, camera: &Camera, samples: u32) -> Drawing {
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.set_view(&view);
+        self.rays.set_eye(&view);
         let mut drawing = Drawing::new(view, samples.min(self.plan.samples));
         // Shadow maps were drawn once, before the first picture.
         drawing.times.add(std::mem::take(&mut self.shadow_maps.times));

@@ -813,6 +813,8 @@ fn rays_through_nested_dielectrics_follow_the_medium_of_highest_priority() {
         ("the last one entered", vec![block.clone(), water(0)], 4),
         ("glass over water, many surfaces", vec![block, water(-1)], 8),
         ("four in one another", nested.to_vec(), 8),
+        ("a bubble in glass", vec![shell(1.3, 1.5, 0.3), shell(0.9, 1.0, 0.7)], 8),
+        ("a bubble in ice in glass", vec![shell(1.3, 1.5, 0.3), shell(0.9, 1.31, 0.7), shell(0.55, 1.0, 1.1)], 8),
         ("four, the outer ones win", (0..4).map(|i| Body { priority: -(i as i32), ..nested[i].clone() }).collect(), 4),
     ] {
         let (worst, compared) = against_paths(&gpu, &bodies, interfaces);

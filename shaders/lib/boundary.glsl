@@ -111,7 +111,12 @@ Layers passing_layers_at(HitSurface hit, Boundary boundary) {
 Layers layers_at(HitSurface hit, Boundary boundary) {
     Layers b = passing_layers_at(hit, boundary);
     if (!b.delta) compensate(b.s);
-    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) b.enters = ground_share(albedo_of_base(b.s));
+    if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) {
+        // The albedo of an interface is that between its two media, by its reflectance at the viewer's angle: all that its lobe
+        // scatters under total reflection, which the albedo in air would leave to the layer below once more.
+        vec3 scattered = b.f_dielectric * b.s.compensation * (b.s.lobe.x + b.s.lobe.y);
+        b.enters = b.solid ? 1.0 - min(largest(scattered), 1.0) : ground_share(albedo_of_base(b.s));
+    }
     return b;
 }
 #endif

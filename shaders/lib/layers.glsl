@@ -304,21 +304,29 @@ struct FacetFresnel {
     bool total; // total internal reflection
 };
 
-// A tint of F0 in air applies between two media too.
+// F0 and F90 of a dielectric between two media, from those in air. What KHR_materials_specular makes of F0 in air applies here too. A
+// body of index 1 reflects nothing in air: nothing is known to apply, and inside another medium it reflects like any other.
+void between_media(inout vec3 f0, inout float f90, float ior, float n1, float n2) {
+    float in_air = nested_f0(1.0, ior);
+    float r0 = nested_f0(n1, n2);
+    f90 = in_air > 0.0 ? f90 : (n1 == n2 ? 0.0 : 1.0);
+    f0 = in_air > 0.0 ? f0 * (r0 / in_air) : vec3(r0);
+}
+
 FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     Surface s = b.s;
     FacetFresnel f;
     float share = b.between || FRESNEL == FRESNEL_EXACT ? boundary_share(cos_in, b.n1, b.n2) : schlick_weight(cos_in);
-    float in_air = nested_f0(1.0, s.ior);
     vec3 f0 = s.f0_dielectric;
-    if (b.solid) f0 *= in_air > 0.0 ? nested_f0(b.n1, b.n2) / in_air : 0.0;
+    float f90 = s.f90_dielectric;
+    if (b.solid) between_media(f0, f90, s.ior, b.n1, b.n2);
     f.total = b.solid && share >= 1.0;
-    f.dielectric = f0 + (vec3(s.f90_dielectric) - f0) * share;
+    f.dielectric = f0 + (vec3(f90) - f0) * share;
     vec3 metal = fresnel_of_metal(s, cos_in);
     if (IRIDESCENCE) {
         Film film = film_of(s, cos_in, b.n1);
         // Of a closed dielectric mesh f0_dielectric is that in air.
-        float r0 = b.solid ? in_air : nested_f0(b.n1, s.ior);
+        float r0 = nested_f0(b.solid ? 1.0 : b.n1, s.ior);
         f.dielectric = under_film(s, film, f.dielectric, b.n2, r0);
         metal = metal_under_film(s, film, metal);
     }

@@ -108,8 +108,10 @@ vec3 mirrored_on_screen(Surface s, bool wanted) {
     float shown = wanted && !s.unlit ? s.occlusion : 0.0;
     // What an anisotropic lobe sees of the environment is no single direction (lib/environment_light.glsl).
     bool is_round = !ANISOTROPY || !is_anisotropic(s);
-    float by_base = is_round && s.roughness <= ROUGHEST_MIRROR ? under_coat(s) * shown : 0.0;
-    vec3 result = screen_instead(s, s.n, s.alpha, albedo_of_base(s).base * by_base);
+    BaseAlbedo albedo = albedo_of_base(s);
+    // The weight with which lib/environment_light.glsl has added the environment.
+    float by_base = is_round && s.roughness <= ROUGHEST_MIRROR ? layer_albedo(s, albedo).under_coat * shown : 0.0;
+    vec3 result = screen_instead(s, s.n, s.alpha, albedo.base * by_base);
     if (CLEARCOAT) {
         float by_coat = s.clearcoat_roughness <= ROUGHEST_MIRROR ? albedo_of_coat(s) * shown : 0.0;
         result += screen_instead(s, s.n_coat, s.clearcoat_alpha, vec3(by_coat));

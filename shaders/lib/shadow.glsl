@@ -29,7 +29,7 @@ uint shadow_rays = 0;
 uint lights_cut_off = 0; // surfaces whose loop over lights ended early, at the limit of loop iterations
 
 // Fresnel reflectance of a dielectric between two media for undeflected light, with the film over it. The angle counts in
-// the thinner medium, so a straight line has no total internal reflection. A tint of F0 in air applies here too. Equal
+// the thinner medium, so a straight line has no total internal reflection. Equal
 // indices reflect nothing without a film; Schlick's curve would.
 vec3 straight_reflectance(Surface s, float cos_v, float n1, float n2) {
     float thinner = min(n1, n2);
@@ -38,10 +38,11 @@ vec3 straight_reflectance(Surface s, float cos_v, float n1, float n2) {
     float r0 = nested_f0(1.0, ratio);
     float share = schlick_weight(cos_v);
     if (FRESNEL == FRESNEL_EXACT) share = clamp((fresnel_dielectric(cos_v, ratio).F - r0) / max(1.0 - r0, 1e-6), 0.0, 1.0);
-    float in_air = nested_f0(1.0, s.ior);
-    vec3 f0 = s.f0_dielectric * (in_air > 0.0 ? r0 / in_air : 0.0);
-    vec3 f = n1 == n2 ? vec3(0.0) : f0 + (vec3(s.f90_dielectric) - f0) * share;
-    if (IRIDESCENCE) f = under_film(s, film_of(s, cos_v, thinner), f, denser, in_air);
+    vec3 f0 = s.f0_dielectric;
+    float f90 = s.f90_dielectric;
+    between_media(f0, f90, s.ior, thinner, denser);
+    vec3 f = n1 == n2 ? vec3(0.0) : f0 + (vec3(f90) - f0) * share;
+    if (IRIDESCENCE) f = under_film(s, film_of(s, cos_v, thinner), f, denser, nested_f0(1.0, s.ior));
     return f;
 }
 

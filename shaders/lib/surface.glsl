@@ -94,7 +94,7 @@ vec3 base_from_texel(Material m, vec3 varies) {
 // A colour of a lobe. In a band of wavelengths the factor is a number, but the texel is still a colour.
 vec3 lobe_color(vec3 factor, vec3 texel) {
     vec3 color = texel * factor;
-    if (SPECTRAL && texel != vec3(1.0)) color *= reflectance_of_rgb(texel) / max(texel, vec3(1e-6));
+    if (SPECTRAL && texel != vec3(1.0)) color = factor * reflectance_of_rgb(texel);
     return color;
 }
 
@@ -123,7 +123,8 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     }
     s.metallic = metal;
     s.f0_dielectric = m.f0 * t.specular;
-    if (SPECULAR_COLORS) s.f0_dielectric = lobe_color(m.f0, t.specular_color) * t.specular;
+    // min(r² · factor · texel, 1) · specular, where F90 is the material's specular.
+    if (SPECULAR_COLORS) s.f0_dielectric = min(lobe_color(m.f0, t.specular_color), vec3(m.f90)) * t.specular;
     s.f90_dielectric = m.f90 * t.specular;
     s.f0_metal = s.base;
     s.n_metal = vec3(0.0);
@@ -194,10 +195,12 @@ void seen_from(inout Surface s, float n_outside) {
     vec3 dielectric_before = s.f0_dielectric;
     vec3 metal_before = s.f0_metal;
     float before = nested_f0(s.n_outside, s.ior);
-    float ratio = before > 0.0 ? nested_f0(n_outside, s.ior) / before : 0.0;
-    s.f0_dielectric = changes ? s.f0_dielectric * ratio : s.f0_dielectric;
+    float r0 = nested_f0(n_outside, s.ior);
+    // As for the interfaces of bodies (between_media).
+    bool unknown = changes && before == 0.0;
+    s.f0_dielectric = unknown ? vec3(r0) : changes ? s.f0_dielectric * (r0 / before) : s.f0_dielectric;
     // Between equal indices nothing is reflected at any angle.
-    s.f90_dielectric = n_outside == s.ior ? 0.0 : s.f90_dielectric;
+    s.f90_dielectric = n_outside == s.ior ? 0.0 : unknown ? 1.0 : s.f90_dielectric;
     if (CONDUCTORS) {
         bool relative = changes && s.n_metal.x > 0.0;
         vec3 n = s.n_metal * (s.n_outside / n_outside);
@@ -210,7 +213,7 @@ void seen_from(inout Surface s, float n_outside) {
     vec3 mixture = s.f0 + (s.f0_dielectric - dielectric_before) * (1.0 - s.metallic);
     mixture += (s.f0_metal - metal_before) * s.metallic;
     s.f0 = changes ? mixture : s.f0;
-    s.f90 = n_outside == s.ior ? s.metallic : s.f90;
+    s.f90 = n_outside == s.ior ? s.metallic : unknown ? 1.0 : s.f90;
     s.n_outside = n_outside;
 }
 

@@ -26,9 +26,10 @@ void main() {
     // A fragment without coverage is dropped. NaN coverage stays: it is counted later.
     if (alpha <= 0.0) return;
     uint slot = atomicAdd(counters[strip], 1u);
+    // The counter continues beyond the end of the buffer, so the host learns how many nodes the frame needs. Nodes are compared, not
+    // words, whose number overflows from 226 million fragments on.
+    if (slot >= uint(nodes.length()) / NODE_WORDS) return;
     uint at = slot * NODE_WORDS;
-    // The counter continues beyond the end of the buffer, so the host learns how many nodes the frame needs.
-    if (at + NODE_WORDS > uint(nodes.length())) return;
     nodes[at + 0] = imageAtomicExchange(heads, ivec2(gl_FragCoord.xy), slot);
     nodes[at + 1] = floatBitsToUint(gl_FragCoord.z);
     nodes[at + 2] = ids.x;

@@ -36,7 +36,20 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn film_alone(&self) -> Result<Picture> {
-        self.read(self.film_on_device())
+        let mut picture = self.read(self.film_on_device())?;
+        if self.targets.film.is_none() && !self.targets.sums.is_empty() {
+            self.divide_unfinished(&mut picture);
+        }
+        Ok(picture)
+    }
+
+    /// Makes the mean of a sum that ended before its last sample, which would have divided it.
+    fn divide_unfinished(&self, sum: &mut Picture) {
+        let [samples, count] = self.drawn;
+        if samples < count {
+            let scale = 1.0 / samples as f32;
+            sum.rgba.iter_mut().flatten().for_each(|value| *value *= scale);
+        }
     }
 
     /// The film on the device, for passes of other programs: linear RGBA in f32, without a background colour.
@@ -51,7 +64,10 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn part(&self, part: Part) -> Result<Option<Picture>> {
-        self.targets.parts.iter().find(|kept| kept.part == part).map(|kept| self.read(kept.film())).transpose()
+        let Some(kept) = self.targets.parts.iter().find(|kept| kept.part == part) else { return Ok(None) };
+        let mut picture = self.read(kept.film())?;
+        self.divide_unfinished(&mut picture);
+        Ok(Some(picture))
     }
 
     /// The sum of `samples` samples in blocks of `block`, read back.
@@ -82,7 +98,7 @@ impl Renderer {
     }
 
     /// The means of the two halves of the last picture's samples, over the background colour; `None` when there is one
-    /// sum.
+    /// sum, or one sample.
     ///
     /// # Errors
     /// When the driver fails.
@@ -97,13 +113,15 @@ impl Renderer {
     /// # Errors
     /// When the driver fails.
     pub fn half_means_alone(&self) -> Result<Option<[Picture; 2]>> {
-        if self.halves() < 2 {
+        let [samples, count] = self.drawn;
+        if self.halves() < 2 || samples < 2 {
             return Ok(None);
         }
-        let [samples, count] = self.drawn;
-        let scale = 2.0 / samples as f32;
         let mut halves = self.half_sums(samples, count)?;
-        halves.iter_mut().flat_map(|half| half.rgba.iter_mut().flatten()).for_each(|value| *value *= scale);
+        for (half, of) in halves.iter_mut().zip(self.samples_of_sums(samples, count).0) {
+            let scale = 1.0 / of as f32;
+            half.rgba.iter_mut().flatten().for_each(|value| *value *= scale);
+        }
         Ok(Some(halves))
     }
 
@@ -157,6 +175,7 @@ impl Renderer {
         let [width, height] = self.settings.size;
         let view = View::new(camera, self.settings.size, self.scene.bounds);
         self.scene.set_view(&view);
+        self.rays.set_eye(&view);
         self.scene.upload_band(None);
         self.camera.write(bytemuck::bytes_of(&view.shared(jitter(0, 1))));
         let mut frame = self.frame();

@@ -6,7 +6,7 @@ use super::{Part, TileShare};
 use crate::gpu::Device;
 use crate::image::Picture;
 use crate::image::tone::{ToneMap, ViewTransform};
-use crate::plan::rungs::Indirect;
+use crate::plan::rungs::{Indirect, Reflection, Refraction};
 use crate::plan::{Architecture, ForcedEffects, Knobs, Refused, Setting};
 use crate::prepare::Conditions;
 use crate::scene::environment::Environment;
@@ -21,8 +21,9 @@ pub(super) fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Resu
         return Err(Refused::error(Setting::Size, why));
     }
     let pixels = u64::from(size[0]) * u64::from(size[1]);
-    // Paths store four words per pixel in one buffer, everything else one.
-    let bytes = if knobs.indirect == Indirect::Path { 16 } else { 4 };
+    // Paths and screen-space rays store four words per pixel in one buffer, everything else one.
+    let by_screen = knobs.reflection == Reflection::Screen || knobs.refraction == Refraction::Screen;
+    let bytes = if knobs.indirect == Indirect::Path || by_screen { 16 } else { 4 };
     if pixels * bytes > device.max_storage_bytes() {
         let most = device.max_storage_bytes() / bytes;
         let why = format!("{}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);

@@ -146,14 +146,17 @@ fn boundary_share(cos: f64, before: f64, behind: f64) -> f64 {
 }
 
 /// Fresnel reflectance of the dielectric part, from the normalised reflectance `share`. KHR_materials_specular tints
-/// F0, so the exact curve is rescaled between F0 and F90; a tint in air applies between two media, too.
+/// F0, so the exact curve is rescaled between F0 and F90; a tint in air applies between two media, too. An index of 1
+/// has nothing in air that could be tinted, and reflects between two media like any other.
 fn fresnel_of_dielectric(m: &Material, at: &Boundary, share: f64) -> DVec3 {
     let specular = f64::from(m.specular);
-    let in_air = nested_f0(1.0, at.ior);
-    let to_media = if in_air > 0.0 { nested_f0(at.before, at.behind) / in_air } else { 0.0 };
-    let f0 = (rgb(m.specular_color) * in_air).min(DVec3::ONE) * specular * to_media;
+    let (in_air, between) = (nested_f0(1.0, at.ior), nested_f0(at.before, at.behind));
     // An interface between equal indices reflects nothing, at any angle.
-    let f90 = if at.ior == 1.0 { 0.0 } else { specular };
+    let f90 = if at.before == at.behind { 0.0 } else { 1.0 };
+    let (f0, f90) = match in_air > 0.0 {
+        true => ((rgb(m.specular_color) * in_air).min(DVec3::ONE) * specular * (between / in_air), specular * f90),
+        false => (DVec3::splat(between), f90),
+    };
     f0 + (DVec3::splat(f90) - f0) * share
 }
 
@@ -400,6 +403,12 @@ mod tests {
         // Between water and glass: ((1.5 − 1.25) / (1.5 + 1.25))² = 1/121.
         let under_water = Layers::of(&white(), &between(1.25, 1.5, false), 1.0);
         near(under_water.share(Layer::Base), DVec3::splat(1.0 / 121.0));
+        // A bubble of air in glass, whose own index says nothing of what it reflects.
+        for cos in COSINES {
+            let bubble = Boundary { ior: 1.0, ..between(1.5, 1.0, true) };
+            let share = Layers::of(&Material { ior: 1.0, ..white() }, &bubble, cos).share(Layer::Base);
+            near(share, DVec3::splat(fresnel_dielectric(cos, 1.0 / 1.5)[0]));
+        }
     }
 
     /// At Brewster's angle r_p is 0 and r_s is (1 − n²)/(1 + n²).

@@ -316,12 +316,14 @@ impl RaysOnDevice {
         lib::add_work::Scene { work_done: &self.counts }
     }
 
-    /// Updates the constants of rays for one sample of a view.
+    /// Finds the media around the eye of a view, before its first sample.
+    pub fn set_eye(&mut self, view: &View) {
+        self.fixed.camera_media = media_around(&self.bodies, &self.solids, view.eye);
+    }
+
+    /// Updates the constants of rays for one sample of a view, whose eye is set.
     pub fn set_view(&mut self, view: &View, sample_index: u32, samples: u32, seed: u32) {
         let eye = view.eye - self.anchor;
-        if sample_index == 0 {
-            self.fixed.camera_media = media_around(&self.bodies, &self.solids, view.eye);
-        }
         let terms = TraceTerms {
             bvh_from_rel: eye.as_vec3().to_array(),
             seed,

@@ -188,7 +188,12 @@ fn draw(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     if let Some(chosen) = chosen.as_mut().filter(|_| !is_cut) {
         chosen.check(&rendered, args.picture.size, &mut renderer, &camera)?;
     }
-    let aovs = if args.aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &args.aov)? };
+    let mut aov = args.aov.clone();
+    if is_cut && rendered.samples < 2 && aov.iter().any(|name| name.of_halves()) {
+        tracing::warn!("--aov: one sample has no halves, so their layers are left out");
+        aov.retain(|name| !name.of_halves());
+    }
+    let aovs = if aov.is_empty() { Vec::new() } else { layers(&mut renderer, &camera, &aov)? };
     phases.end("readback");
     warn_about(&rendered, settings_size(&args.picture), &knobs, renderer.plan().bands);
 

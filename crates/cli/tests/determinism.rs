@@ -31,6 +31,29 @@ fn a_picture_is_drawn_the_same_again() {
     }
 }
 
+/// The film of a picture that is stopped is the mean of the samples that it has, also where one sum is the film.
+#[test]
+fn a_picture_that_is_stopped_is_a_mean() {
+    let gpu = Gpu::open();
+    let environment = Environment::constant([0.3, 0.4, 0.5]);
+    let scene = study::load("lamps").expect("a study scene");
+    let settings = Settings { knobs: knobs(&["samples=16"]), ..settings([96, 54]) };
+    let mut renderer = gpu.renderer(&scene, Some(&environment), settings);
+    let mean = |film: &etalon::image::Picture| {
+        let sum: f64 = film.rgba.iter().flatten().map(|value| f64::from(*value)).sum();
+        sum / (4 * film.rgba.len()) as f64
+    };
+    renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+    let whole = mean(&renderer.film().expect("the film"));
+    let mut drawing = renderer.begin(&scene.cameras[0], 16);
+    for samples in 1..=3 {
+        renderer.step(&mut drawing).expect("a sample");
+        let film = renderer.film().expect("the film");
+        assert!((mean(&film) / whole - 1.0).abs() < 0.05, "{samples}: {} for {whole}", mean(&film));
+        assert!(film.rgba.iter().all(|pixel| pixel[3] <= 1.0 + 1e-6), "{samples}");
+    }
+}
+
 #[test]
 fn other_cameras_leave_no_trace() {
     let gpu = Gpu::open();
