@@ -85,6 +85,11 @@ fn hidden_nodes_hide_what_is_below_them() {
     builder.json["scenes"] = json!([{ "nodes": [0] }]);
     builder.json["extensionsUsed"] = json!(["KHR_node_visibility"]);
     assert_eq!(names(&loaded(&builder, &LoadOptions::default()).unwrap()), ["root", "shown"]);
+    // Cameras are no meshes.
+    builder.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1 } }]);
+    builder.json["nodes"][3]["camera"] = json!(0);
+    let scene = loaded(&builder, &LoadOptions::default()).unwrap();
+    assert_eq!(scene.cameras.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>(), ["below"]);
 }
 
 #[test]
@@ -128,7 +133,9 @@ fn animate(builder: &mut Builder, pointer: &str, shape: &str, values: &[f32], in
 #[test]
 fn pointers_animate_nodes_materials_and_visibility() {
     let mut builder = one_triangle();
-    builder.json["materials"] = json!([{ "name": "m" }]);
+    // A volume without an attenuation distance, whose default is infinite, which JSON cannot say.
+    let volume = json!({ "KHR_materials_volume": { "thicknessFactor": 0.5 } });
+    builder.json["materials"] = json!([{ "name": "m", "extensions": volume }]);
     builder.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     builder.root(json!({ "name": "moved", "mesh": 0 }));
     builder.root(json!({ "name": "blinking", "mesh": 0 }));
@@ -149,6 +156,7 @@ fn pointers_animate_nodes_materials_and_visibility() {
     assert_eq!(middle.instances[0].world_from_object.translation, DVec3::new(2.0, 0.0, 0.0));
     assert_eq!(middle.materials[0].base_color, [0.5, 0.75, 1.0, 1.0]);
     assert_eq!(middle.materials[0].ior, 2.0);
+    assert_eq!(middle.materials[0].attenuation_distance, f32::INFINITY);
     assert_eq!(names(&at(Some(1.0))), ["moved"]);
     assert_eq!(rest.duration, Some(1.0));
 

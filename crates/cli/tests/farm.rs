@@ -66,6 +66,8 @@ fn parts_are_the_picture_of_one_run() {
         // Paths in halves, more samples than blocks, and a number of parts that divides nothing.
         ("study:cornell --model global --set samples=256", "tiles", 5),
         ("study:cornell --model global --set samples=256", "samples", 5),
+        // An eye in water, which each part has to find.
+        ("study:pool --model recursive --set samples=16", "samples", 2),
         // Rays, parts of the picture and layers of surfaces.
         ("study:etalon --set samples=4 --aov reflection,normal,material", "tiles", 3),
         // Transparent surfaces, and more samples than blocks without halves.
@@ -178,6 +180,15 @@ fn what_cannot_be_divided_is_refused() {
         ("--cameras nobody -o {camera}.png", 2, "nobody"),
         ("--cameras all -o a.png", 2, "{camera}"),
         ("--turntable 2 --within 5", 2, "--within"),
+        ("--fps 5 -o a.png", 2, "--fps"),
+        ("--turntable 2 --shard 1/2 --split samples -o {frame}.png", 2, "--split"),
+        ("--turntable 3000000000 -o {frame}.png", 2, "--turntable"),
+        ("--aov normal,normal -o a.exr", 2, "named twice"),
+        ("--shard 1/2 -o a --aov normal,normal", 2, "named twice"),
+        // Files that the command reads or writes already.
+        ("--report cornell.png", 2, "--report cornell.png"),
+        ("--turntable 3 -o a.{frame}.png --report a.1.png", 2, "--report a.1.png"),
+        ("--env a.exr -o a.exr", 2, "--env a.exr"),
     ] {
         // 8 tiles.
         run(at, &format!("render study:cornell --size 32x16 {arguments}")).failed(code, said);
@@ -253,6 +264,11 @@ fn a_turntable_comes_around() {
     assert!(distance("t0.exr", "t4.exr") < 0.02, "a whole turn is another picture");
     assert!(distance("t0.exr", "t1.exr") > 0.1, "nothing turned");
     run(at, "render study:lamps --size 32x24 --model local --cameras all -o {camera}.png").succeeded();
+    // A file of another kind under a name that nobody gave is not replaced.
+    std::fs::write(at.join("lamps.front.png"), "mine").expect("a file");
+    let unnamed = "render study:lamps --size 32x24 --model local --cameras all";
+    run(at, unnamed).failed(1, "may be a picture of another scene");
+    std::fs::remove_file(at.join("lamps.front.png")).expect("a file");
     run(at, "render study:lamps --size 32x24 --model local --camera front -o one.png").succeeded();
     assert_eq!(run(at, "diff front.png one.png --metric mse").succeeded().stdout, "mse 0\n");
 }
@@ -355,6 +371,8 @@ fn job_files_are_what_their_engines_read() {
             "{engine}: {text}"
         );
     }
+    let by_samples = format!("farm job --engine slurm --tasks 4 -- {still} --split samples");
+    assert!(run(at, &by_samples).succeeded().stdout.contains("--split samples"));
     for (arguments, code, said) in [
         ("--engine slurm -- study:cornell", 2, "--tasks"),
         ("--engine slurm --minutes 5 -- study:cornell", 2, "--cost DIR"),
@@ -365,6 +383,12 @@ fn job_files_are_what_their_engines_read() {
         ("--engine slurm --tasks 2 -- study:cornell --turntable 5", 2, "name the files"),
         ("--engine slurm --tasks 2 -- study:lamps --cameras all -o {camera}.png", 2, "divided by frames"),
         ("--engine slurm --minutes 1 --cost nowhere -- study:cornell", 1, "nowhere"),
+        // What tasks would refuse, or overwrite.
+        ("--engine openjd --tasks 4 -- moves.glb --frames 1-4 -o out.png", 2, "need a frame number"),
+        ("--engine slurm --tasks 4 -- study:cornell -o c.jpg", 2, "only .png and .exr"),
+        ("--engine slurm --tasks 4 -- study:cornell --report r.json -o c.exr", 2, "--report"),
+        ("--engine slurm --tasks 4 -- study:cornell --keep -o c.exr", 2, "--keep"),
+        ("--engine slurm --tasks 4 --here elsewhere -- study:cornell", 2, "--here"),
     ] {
         run(at, &format!("farm job {arguments}")).failed(code, said);
     }

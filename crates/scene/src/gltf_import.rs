@@ -337,16 +337,18 @@ impl<'d, 'b, 'w> InstancePlacer<'d, 'b, 'w> {
     fn run(self, resting: &mut HashMap<(usize, usize), Mesh>) -> Result<(Vec<Mesh>, Vec<Instance>, Vec<usize>)> {
         let (document, materials): (_, &[Material]) = (self.document, self.materials);
         let (jobs, everything) = (&self.jobs, self.everything);
+        // A material that a pointer animates may need other coordinates and tangents at another time.
+        let keeps = |job: &PrimitiveJob| job.pose.is_rest() && document.pointers.is_empty();
         let built = jobs
             .par_iter()
-            .map(|job| match resting.get(&(job.mesh, job.primitive)).filter(|_| job.pose.is_rest()) {
+            .map(|job| match resting.get(&(job.mesh, job.primitive)).filter(|_| keeps(job)) {
                 Some(mesh) => Ok(BuiltPrimitive { mesh: mesh.clone(), strokes: Vec::new(), warnings: Vec::new() }),
                 None => build(document, materials, job, everything)
                     .with_context(|| place(document, job.mesh, job.primitive)),
             })
             .collect::<Result<Vec<_>>>()?;
         for (job, built) in jobs.iter().zip(&built) {
-            if job.pose.is_rest() && built.strokes.is_empty() {
+            if keeps(job) && built.strokes.is_empty() {
                 resting.entry((job.mesh, job.primitive)).or_insert_with(|| built.mesh.clone());
             }
         }
@@ -728,7 +730,8 @@ fn bend(mesh: &mut Mesh, skin: &Skin, joints: &[DAffine3]) -> bool {
 fn cameras(document: &Document<'_>, nodes: &Nodes, warnings: &mut Vec<String>) -> Result<Vec<(usize, Camera)>> {
     let root = &document.root;
     let mut cameras = Vec::new();
-    for &node in &nodes.shown {
+    // Invisible nodes have cameras, too (KHR_node_visibility).
+    for &node in &nodes.in_scene {
         let Some(index) = root.nodes[node].camera.map(|c| c.value()) else { continue };
         let camera = &root.cameras[index];
         let place = format!("camera {index} at {}", label(document, node));

@@ -78,9 +78,23 @@ fn whole_numbers(value: &mut Value) {
     }
 }
 
+/// Removes members that are null. JSON has no infinity, which is the default of `attenuationDistance`; what a file leaves out has its
+/// default again.
+fn drop_nulls(value: &mut Value) {
+    match value {
+        Value::Array(values) => values.iter_mut().for_each(drop_nulls),
+        Value::Object(members) => {
+            members.retain(|_, member| !member.is_null());
+            members.values_mut().for_each(drop_nulls);
+        }
+        _ => {}
+    }
+}
+
 /// The file at a time of its animation: each property that a pointer animates has its value of that time.
 pub(crate) fn at(document: &Document<'_>, plays: &[bool], time: f64) -> Result<Root> {
     let mut value = serde_json::to_value(&document.root)?;
+    drop_nulls(&mut value);
     complete(&mut value);
     for channel in document.pointers.iter().filter(|channel| plays.get(channel.animation) == Some(&true)) {
         let PointerChannel { animation, sampler, pointer } = channel;

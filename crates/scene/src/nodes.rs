@@ -26,6 +26,8 @@ pub(crate) struct Nodes {
     /// Transforms of the copies of a node's mesh (EXT_mesh_gpu_instancing), in the node's space; `None` for one copy.
     pub(crate) copies: Vec<Option<Vec<DAffine3>>>,
     /// Nodes of the rendered scene, in the order of the file.
+    pub(crate) in_scene: Vec<usize>,
+    /// Those of them that are visible.
     pub(crate) shown: Vec<usize>,
     /// Which of all nodes the options hide: their meshes and lights are left out.
     pub(crate) hidden: Vec<bool>,
@@ -80,7 +82,7 @@ impl Nodes {
         }
         let parents = parents(document)?;
         let world_from_node = place(document, &parents, &locals)?;
-        let shown = shown(document, options.scene.as_deref(), &parents, warnings)?;
+        let [in_scene, shown] = shown(document, options.scene.as_deref(), &parents, warnings)?;
         let mut copies = vec![None; nodes.len()];
         for &node in &shown {
             copies[node] = instances(document, node).with_context(|| label(document, node))?;
@@ -89,7 +91,7 @@ impl Nodes {
         let hidden = outline::hidden(options, &names, &parents)?;
         let duration = document.root.animations.iter().zip(plays).filter(|(_, plays)| **plays);
         let duration = duration.filter_map(|(animation, _)| end(document, animation)).reduce(f64::max);
-        Ok(Self { world_from_node, copies, shown, hidden, parents, animated_weights, duration })
+        Ok(Self { world_from_node, copies, in_scene, shown, hidden, parents, animated_weights, duration })
     }
 }
 
@@ -200,18 +202,19 @@ pub(crate) fn chosen_scene(root: &json::Root, wanted: Option<&str>) -> Result<us
     by_name_or_index("scene", wanted, &names)
 }
 
+/// The nodes of the scene, and those of them that are visible.
 fn shown(
     document: &Document<'_>,
     scene: Option<&str>,
     parents: &[Option<usize>],
     warnings: &mut Vec<String>,
-) -> Result<Vec<usize>> {
+) -> Result<[Vec<usize>; 2]> {
     let root = &document.root;
-    let mut stack: Vec<usize> = match root.scenes.get(chosen_scene(root, scene)?) {
+    let roots: Vec<usize> = match root.scenes.get(chosen_scene(root, scene)?) {
         Some(scene) => scene.nodes.iter().map(json::Index::value).collect(),
         None => (0..root.nodes.len()).filter(|&i| parents[i].is_none()).collect(),
     };
-    for &i in &stack {
+    for &i in &roots {
         if let Some(parent) = parents.get(i).copied().flatten() {
             warnings.push(format!(
                 "{} is named as a root of the scene although it is a child of node {parent}; it keeps its parent's placement",
@@ -219,13 +222,16 @@ fn shown(
             ));
         }
     }
-    let mut is_shown = vec![false; root.nodes.len()];
-    while let Some(i) = stack.pop() {
-        if is_visible(&root.nodes[i]) && !std::mem::replace(&mut is_shown[i], true) {
-            stack.extend(root.nodes[i].children.iter().flatten().map(json::Index::value));
+    let reached = |mut stack: Vec<usize>, passes: &dyn Fn(usize) -> bool| -> Vec<usize> {
+        let mut is_reached = vec![false; root.nodes.len()];
+        while let Some(i) = stack.pop() {
+            if passes(i) && !std::mem::replace(&mut is_reached[i], true) {
+                stack.extend(root.nodes[i].children.iter().flatten().map(json::Index::value));
+            }
         }
-    }
-    Ok((0..root.nodes.len()).filter(|&i| is_shown[i]).collect())
+        (0..root.nodes.len()).filter(|&i| is_reached[i]).collect()
+    };
+    Ok([reached(roots.clone(), &|_| true), reached(roots, &|i| is_visible(&root.nodes[i]))])
 }
 
 /// Position of a time among keyframes.

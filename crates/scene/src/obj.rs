@@ -44,20 +44,34 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Keywords that are followed by a name, which may contain a number sign.
+const NAMES: [&str; 7] = ["newmtl", "usemtl", "mtllib", "norm", "o", "g", "s"];
+
+/// Where a comment begins in a line: at a number sign, but behind a name only where a space follows it.
+fn comment(line: &str) -> Option<usize> {
+    let keyword = line.split_whitespace().next().unwrap_or_default();
+    let is_named =
+        NAMES.contains(&keyword) || keyword.starts_with("map_") || ["bump", "disp", "decal", "refl"].contains(&keyword);
+    match is_named {
+        true => line.find("# "),
+        false => line.find('#'),
+    }
+}
+
 /// Lines without comments, numbered by their first line from 1. A backslash at the end of a line joins it with the
-/// next.
+/// next, unless it ends a comment.
 fn logical_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = text.lines().enumerate();
     std::iter::from_fn(move || {
         let (number, first) = lines.next()?;
         let mut line = Cow::Borrowed(first.trim_end());
-        while let Some(begun) = line.strip_suffix('\\') {
+        while let Some(begun) = line.strip_suffix('\\').filter(|line| !line.trim_start().starts_with('#')) {
             line = match lines.next() {
                 Some((_, next)) => Cow::Owned(format!("{begun} {}", next.trim_end())),
                 None => Cow::Owned(begun.to_owned()),
             };
         }
-        if let Some(comment) = line.find('#') {
+        if let Some(comment) = comment(&line) {
             line = match line {
                 Cow::Borrowed(line) => Cow::Borrowed(&line[..comment]),
                 Cow::Owned(line) => Cow::Owned(line[..comment].to_owned()),
@@ -746,6 +760,14 @@ mod tests {
             assert!(areas.iter().all(|&a| a > 0.0), "{areas:?}");
             assert!((areas.iter().sum::<f64>() - 4.0).abs() < 1e-12, "{areas:?}");
         }
+    }
+
+    #[test]
+    fn number_signs_are_parts_of_names() {
+        let text =
+            "# exported to D:\\models\\\nnewmtl Material #25\nmap_Kd wood#2.png # oak\nv 1 2 3#4\nf 1 \\\n2 3 # last";
+        let lines: Vec<String> = logical_lines(text).map(|(_, line)| line.trim_end().to_owned()).collect();
+        assert_eq!(lines, ["", "newmtl Material #25", "map_Kd wood#2.png", "v 1 2 3", "f 1  2 3"]);
     }
 
     #[test]
