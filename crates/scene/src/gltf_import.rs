@@ -504,8 +504,11 @@ fn build(
     // Primitives without a material get glTF's default material, the last one.
     let material = json.material.map_or(materials.len() - 1, |m| m.value());
     let read = Coordinates::of(&materials[material]);
+    // Tangents that a primitive lacks are made from the coordinates of their set.
+    let has_tangents = json.attributes.contains_key(&Checked::Valid(Semantic::Tangents));
+    let makes_tangents = |set: usize| read.tangents == Some(set) && !has_tangents;
     let uvs = |set: usize| match get(Semantic::TexCoords(set as u32))? {
-        Some(accessor) if everything || read.kept[set] => accessor.floats::<2>(),
+        Some(accessor) if everything || read.kept[set] || makes_tangents(set) => accessor.floats::<2>(),
         _ => Ok(Vec::new()),
     };
     let mut mesh = Mesh {

@@ -83,8 +83,7 @@ pub(crate) fn prune_textures(m: &mut Material, used: bool, ambient: bool) -> Vec
 /// textures or of its anisotropy.
 pub(crate) struct Coordinates {
     pub(crate) sets: [bool; 2],
-    /// Sets that are kept. A textured material keeps set 0: ray tracing computes the texel density from it. So does one
-    /// whose tangents may have to be made from it.
+    /// Sets that are kept. A textured material keeps set 0: ray tracing computes the texel density from it.
     pub(crate) kept: [bool; 2],
     pub(crate) tangents: Option<usize>,
 }
@@ -100,8 +99,7 @@ impl Coordinates {
             .or(m.clearcoat_normal_texture)
             .map(set)
             .or(directed.map(|(_, of)| of.textures.iter().flatten().next().copied().map_or(0, set)));
-        let kept = [reads(0) || reads(1) || tangents == Some(0), reads(1)];
-        Self { sets: [reads(0), reads(1)], kept, tangents }
+        Self { sets: [reads(0), reads(1)], kept: [reads(0) || reads(1), reads(1)], tangents }
     }
 }
 
