@@ -9,7 +9,7 @@ use palette::color_difference::Ciede2000;
 use palette::{IntoColor, Lab, Srgb};
 use rayon::prelude::*;
 
-use super::statistics::{Estimate, Interval};
+use super::statistics::{Estimate, Interval, resolved};
 use super::table::{Errors, WorstPixel};
 use etalon::image::Picture;
 use etalon::image::metric::{AnyPicture, Comparison, Metric, compare};
@@ -306,8 +306,8 @@ impl ShownReference {
         Estimate { mean, deviation, bias: 2.0 * mean.max(0.0).sqrt() * self.off + self.off * self.off }
     }
 
-    /// Confidence interval of the root mean squared error of display values 0 to 1. Noise moves the square, and a bias β
-    /// the root, by at most β (triangle inequality).
+    /// Confidence interval of the root mean squared error of display values 0 to 1. Noise moves the square, and a bias
+    /// β the root, by at most β (triangle inequality).
     #[must_use]
     pub fn error_interval(&self, x: &Display) -> Interval {
         let Interval { median, low, high } = Estimate { bias: 0.0, ..self.error(x) }.interval().root();
@@ -335,13 +335,6 @@ impl ShownReference {
             self.means(|_, _, _, squared| SquaredSums { variance: squared, ..SquaredSums::default() });
         resolved(self.off, (standard_errors * deviation).sqrt())
     }
-}
-
-/// Resolution of a reference with a bias of at most β (`off`), whose resolution by its noise alone is √(z σ): the least m
-/// with m² > z σ + 2mβ + β².
-#[must_use]
-pub(super) fn resolved(off: f64, by_noise: f64) -> f64 {
-    (off + (2.0 * off * off + by_noise * by_noise).sqrt()).min(1.0)
 }
 
 /// Mean of pictures of one size.

@@ -12,9 +12,9 @@ use std::time::Instant;
 use anyhow::{Context as _, Result, bail, ensure};
 
 use super::command::{arguments, named, set};
-use super::difference::{Shown, ShownReference, Truth, in_blocks, mean_of, resolved, shown, significant};
+use super::difference::{Shown, ShownReference, Truth, in_blocks, mean_of, shown, significant};
 use super::size::{fewer, pixels, resized};
-use super::statistics::{MANY, standard_errors};
+use super::statistics::{MANY, resolved, standard_errors};
 use super::table::{RESOLVED, Reference, Round};
 use super::warm::{Bench, total};
 use etalon::frame::{Progress, TileShare};

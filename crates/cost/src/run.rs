@@ -184,8 +184,8 @@ impl Run<'_> {
         self.sweep.limit_s().is_finite()
     }
 
-    /// Samples that the reference should have. A later run improves a reference that has those of the pilot and is still
-    /// noisy. That is decided before it draws samples, and by their variance, not by what they show.
+    /// Samples that the reference should have. A later run improves a reference that has those of the pilot and is
+    /// still noisy. That is decided before it draws samples, and by their variance, not by what they show.
     fn wanted(&self, reference: &Reference) -> u32 {
         let enough = reference.samples < self.pilot.wanted || reference.converged || reference.lacks_bands();
         if enough { self.pilot.wanted } else { AGAIN * reference.samples }

@@ -88,6 +88,13 @@ pub fn standard_errors(statements: usize, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - tail))
 }
 
+/// Resolution of a reference with a bias of at most β (`off`), whose resolution by its noise alone is √(z σ): the least
+/// m with m² > z σ + 2mβ + β².
+#[must_use]
+pub fn resolved(off: f64, by_noise: f64) -> f64 {
+    (off + (2.0 * off * off + by_noise * by_noise).sqrt()).min(1.0)
+}
+
 /// Degrees of freedom of estimates over pixels, for which Student's t distribution is practically normal.
 pub const MANY: f64 = 1e4;
 

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
-use super::difference::resolved;
-use super::statistics::Interval;
+use super::statistics::{Interval, resolved};
 use etalon::frame::Settings;
 use etalon::gpu::Compiled;
 use etalon::image::tone::ViewTransform;
@@ -104,9 +103,9 @@ pub struct Reference {
     pub own_flip: f64,
     /// Resolution: least error of display values 0 to 1 that is significant.
     pub resolution: f64,
-    /// Root mean square, in display values 0 to 1, by which fewer bands of wavelengths than the most are off, as far as
-    /// rays tell, or RGB, as far as the pilot tells; a part of `resolution`, and of the intervals of errors and of their
-    /// differences.
+    /// Root mean square, in display values 0 to 1, by which fewer bands of wavelengths than the most are off, as far
+    /// as rays tell, or RGB, as far as the pilot tells; a part of `resolution`, and of the intervals of errors and of
+    /// their differences.
     #[serde(default)]
     pub off_by_bands: f64,
     /// Tone curve, exposure and background of the display values that are compared.

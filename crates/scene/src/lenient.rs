@@ -78,8 +78,8 @@ fn whole_numbers(value: &mut Value) {
     }
 }
 
-/// Removes members that are null. JSON has no infinity, which is the default of `attenuationDistance`; what a file leaves out has its
-/// default again.
+/// Removes members that are null. JSON has no infinity, which is the default of `attenuationDistance`; what a file
+/// leaves out has its default again.
 fn drop_nulls(value: &mut Value) {
     match value {
         Value::Array(values) => values.iter_mut().for_each(drop_nulls),
