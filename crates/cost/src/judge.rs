@@ -234,9 +234,8 @@ impl Judge<'_> {
     }
 
     /// Pareto frontier of some points: indices of those that no other of them beats in time and error at once, the
-    /// fastest first, the reference last. Each point has significantly less error than the one before, and than the
-    /// quicker one with the least error, which is another one where it was not significantly better than the one before
-    /// it. Of two points with equal times the better one is kept.
+    /// fastest first, the reference last. Each point has significantly less error than the one before, and no quicker
+    /// picture has significantly less error than it. Of two points with equal times the better one is kept.
     fn frontier(&self, points: &[Point], displays: &[Display], sure: f64, some: impl Fn(&Point) -> bool) -> Vec<usize> {
         let reference = points.iter().position(|point| point.name == REFERENCE);
         let time = |i: usize| points[i].gpu_ms.median;
@@ -247,12 +246,13 @@ impl Judge<'_> {
         let mut all: Vec<usize> = Vec::new();
         let mut least: Option<usize> = None;
         for i in order {
-            let better = |known: usize| self.truth.shown.more_error(&displays[i], &displays[known]).is_below(sure);
-            let beats_all = all.last().copied().is_none_or(better) && least.is_none_or(better);
+            let more = |known: usize| self.truth.shown.more_error(&displays[i], &displays[known]);
+            let beaten = least.is_some_and(|least| more(least).is_above(sure));
+            let better = !beaten && all.last().is_none_or(|&last| more(last).is_below(sure));
             if least.is_none_or(|least| points[i].error() < points[least].error()) {
                 least = Some(i);
             }
-            if !beats_all {
+            if !better {
                 continue;
             }
             while all.last().is_some_and(|&last| time(i) < SAME_TIME * time(last)) {
