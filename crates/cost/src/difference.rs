@@ -166,7 +166,7 @@ pub fn significant(squares: &[(u32, Estimate)], standard_errors: f64) -> Option<
 /// smaller by a factor r. For a smooth curve and noise with finite variance r is 1/2; where few paths carry most of the
 /// light, r is closer to 1. The mean brightness of quarters, halves and all of the samples gives r, and the rest of the
 /// geometric series is added (Aitken extrapolation; for r = 1/2 it is the jackknife of Quenouille). No series predicts
-/// every scene (docs/cost.md has figures of `study:pool`): hence [`CAUTION`].
+/// every scene (docs/cost.md has figures of `study:pool`): hence the factor of the bound of the bias.
 pub struct ShownReference {
     /// The two estimates.
     estimates: [Shown; 2],
