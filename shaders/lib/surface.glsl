@@ -123,8 +123,11 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     }
     s.metallic = metal;
     s.f0_dielectric = m.f0 * t.specular;
-    // min(r² · factor · texel, 1) · specular, where F90 is the material's specular.
-    if (SPECULAR_COLORS) s.f0_dielectric = min(lobe_color(m.f0, t.specular_color), vec3(m.f90)) * t.specular;
+    if (SPECULAR_COLORS) {
+        // min(r² · factor · texel, 1) · specular, where F90 is the material's specular. Blinn and Phong's lobe has no such bound.
+        vec3 f0 = lobe_color(m.f0, t.specular_color);
+        s.f0_dielectric = (BRDF == BRDF_BLINN_PHONG ? f0 : min(f0, vec3(m.f90))) * t.specular;
+    }
     s.f90_dielectric = m.f90 * t.specular;
     s.f0_metal = s.base;
     s.n_metal = vec3(0.0);

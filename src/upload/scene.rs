@@ -558,7 +558,8 @@ fn shared_material(m: &Material, index: usize, knobs: &Knobs, grid: u32, shares:
     let flag = |is: bool, flag: u32| if is { flag } else { 0 };
     let metal = m.conductor.unwrap_or_default();
     // With a texture of colours the product is clamped (lib/surface.glsl).
-    let most = if m.specular_color_texture.is_some() { f32::INFINITY } else { 1.0 };
+    let is_clamped_later = m.specular_color_texture.is_some() && knobs.brdf != Brdf::BlinnPhong;
+    let most = if is_clamped_later { f32::INFINITY } else { 1.0 };
     let mut f0 = m.specular_color.map(|c| (r * r * c).min(most) * m.specular);
     let [red, green, blue, alpha] = m.base_color;
     let mut base = [red, green, blue];
