@@ -13,6 +13,15 @@ pub(super) fn pack_half_2x16([x, y]: [f16; 2]) -> u32 {
     u32::from(x.to_bits()) | u32::from(y.to_bits()) << 16
 }
 
+/// Refuses a buffer that shaders cannot bind whole.
+pub(super) fn check_bound(device: &Device, name: &str, bytes: u64) -> Result<()> {
+    if bytes > device.max_storage_bytes() {
+        let limit = format!("binds at most {} bytes of one", device.max_storage_bytes());
+        bail!(TooLarge { what: format!("creating buffer \"{name}\" of {bytes} bytes"), limit });
+    }
+    Ok(())
+}
+
 /// A buffer with `data` in the device's fastest memory: written directly on a CPU device, through a staging buffer on
 /// others.
 ///
@@ -27,9 +36,8 @@ pub fn upload<T: bytemuck::NoUninit>(
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
     let size = bytes.len() as u64;
-    if texels.is_none() && size > device.max_storage_bytes() {
-        let limit = format!("binds at most {} at once", device.max_storage_bytes());
-        bail!(TooLarge { what: format!("buffer \"{name}\" of {size} bytes"), limit });
+    if texels.is_none() {
+        check_bound(device, name, size)?;
     }
     let mut buffer = match texels {
         Some(format) => Buffer::texels(device, name, size, place, format)?,

@@ -339,6 +339,7 @@ fn the_page_of_devices_names_each_requirement() {
     for (name, says) in [
         ("COLOR_TARGETS", "colour targets"),
         ("STORAGE_IMAGES", "storage images"),
+        ("SAMPLED_IMAGES", "sampled images"),
         ("STORAGE_BUFFERS_AND_TABLES", "storage buffers"),
     ] {
         let value =

@@ -270,6 +270,8 @@ impl Description {
             max_per_stage_descriptor_storage_images = "maxPerStageDescriptorStorageImages",
             max_per_stage_descriptor_storage_buffers = "maxPerStageDescriptorStorageBuffers",
             max_per_stage_descriptor_uniform_buffers = "maxPerStageDescriptorUniformBuffers",
+            max_per_stage_descriptor_samplers = "maxPerStageDescriptorSamplers",
+            max_per_stage_descriptor_sampled_images = "maxPerStageDescriptorSampledImages",
             max_draw_indexed_index_value = "maxDrawIndexedIndexValue",
             sub_pixel_precision_bits = "subPixelPrecisionBits",
         );

@@ -94,6 +94,7 @@ impl<'p> Programs<'p> {
                     "storage buffers and tables",
                 ),
                 (&["UniformBuffer"][..], "UNIFORM_BUFFERS", "uniform buffers"),
+                (&["SampledImage"][..], "SAMPLED_IMAGES", "sampled images"),
             ] {
                 match all().filter(|b| kinds.contains(&b.kind)).count() {
                     0 => {}

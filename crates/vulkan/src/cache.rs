@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use ash::vk;
 
-use super::shader::Program;
+use super::shader::{Program, SetLayout};
 
 /// Sampler state: address modes and filters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -62,8 +62,8 @@ pub(super) struct Layout {
 
 #[derive(Default)]
 pub(super) struct Caches {
-    pub(super) layouts: HashMap<&'static str, Layout>,
-    pub(super) set_layouts: HashMap<&'static str, vk::DescriptorSetLayout>,
+    pub(super) layouts: HashMap<&'static Program, Layout>,
+    pub(super) set_layouts: HashMap<&'static SetLayout, vk::DescriptorSetLayout>,
     pub(super) pipelines: HashMap<PipelineKey, vk::Pipeline>,
     pub(super) samplers: HashMap<SamplerDesc, vk::Sampler>,
     /// SPIR-V that replaces the built code, by program name and stage index.

@@ -156,6 +156,8 @@ impl Capabilities {
                 max_per_stage_descriptor_storage_images = "maxPerStageDescriptorStorageImages",
                 max_per_stage_descriptor_storage_buffers = "maxPerStageDescriptorStorageBuffers",
                 max_per_stage_descriptor_uniform_buffers = "maxPerStageDescriptorUniformBuffers",
+                max_per_stage_descriptor_samplers = "maxPerStageDescriptorSamplers",
+                max_per_stage_descriptor_sampled_images = "maxPerStageDescriptorSampledImages",
                 max_draw_indexed_index_value = "maxDrawIndexedIndexValue",
                 sub_pixel_precision_bits = "subPixelPrecisionBits",
                 sub_texel_precision_bits = "subTexelPrecisionBits",
@@ -187,7 +189,7 @@ impl Capabilities {
             subgroup_arithmetic: compute
                 && v11.subgroup_supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC),
             subgroup_size: v11.subgroup_size,
-            timestamps: limits.timestamp_compute_and_graphics == vk::TRUE,
+            timestamps: device.has_timestamps(),
             timestamp_ns: limits.timestamp_period,
         }
     }

@@ -18,7 +18,9 @@ use super::cache::Caches;
 use super::choice::DeviceChoice;
 use super::error::NotOpened;
 use super::kept_pipelines::KeptPipelines;
-use super::limits::{COLOR_TARGETS, STORAGE_BUFFERS, STORAGE_BUFFERS_AND_TABLES, STORAGE_IMAGES, UNIFORM_BUFFERS};
+use super::limits::{
+    COLOR_TARGETS, SAMPLED_IMAGES, STORAGE_BUFFERS, STORAGE_BUFFERS_AND_TABLES, STORAGE_IMAGES, UNIFORM_BUFFERS,
+};
 use super::offers::Offers;
 use super::pace::{OF_FRAME, SliceTimes};
 use super::surface::Surface;
@@ -296,7 +298,9 @@ impl Instance {
             }
         }
         let buffers = if offers.texel_buffers { STORAGE_BUFFERS } else { STORAGE_BUFFERS_AND_TABLES };
+        let sampled = limits.max_per_stage_descriptor_samplers.min(limits.max_per_stage_descriptor_sampled_images);
         for (has, needed, what) in [
+            (sampled, SAMPLED_IMAGES, "sampled images in a shader"),
             (limits.max_per_stage_descriptor_storage_images, STORAGE_IMAGES, "storage images in a shader"),
             (limits.max_per_stage_descriptor_storage_buffers, buffers, "storage buffers in a shader"),
             (limits.max_per_stage_descriptor_uniform_buffers, UNIFORM_BUFFERS, "uniform buffers in a shader"),
@@ -417,13 +421,15 @@ pub struct Device {
     #[cfg(feature = "window")]
     pub(super) family: u32,
     pub(super) time_slices: SliceTimes,
-    pub(super) instance: Instance,
+    pub(super) instance: Arc<Instance>,
+    /// The bits of a timestamp that count; none on a device without timestamps.
+    timestamp_bits: u64,
 }
 
 impl Device {
     /// Opens a device of an instance; with a surface, one that can present to it.
     pub(super) fn open_on(
-        instance: Instance,
+        instance: Arc<Instance>,
         choice: &DeviceChoice,
         surface: Option<&Surface>,
         time_slices: bool,
@@ -449,6 +455,7 @@ impl Device {
             .ok_or_else(|| anyhow!("no queue with graphics and compute"))
             .with_context(opening)? as u32;
 
+        let bits = families[family as usize].timestamp_valid_bits;
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
         let mut names = Vec::new();
         if offers.push_descriptors {
@@ -487,7 +494,7 @@ impl Device {
         }
         // SAFETY: `Instance::missing` and `Offers` have found every requested feature.
         let raw = unsafe { instance.raw.create_device(physical, &create, None) }.with_context(opening)?;
-        let allocator = Allocator::new(&AllocatorCreateDesc {
+        let allocated = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: raw.clone(),
             physical_device: physical,
@@ -495,20 +502,27 @@ impl Device {
             buffer_device_address: false,
             // Small blocks for sub-allocation: an idle block of 256 MiB would be most of a software renderer's memory.
             allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 8 << 20),
-        })
-        .with_context(opening)?;
-        // SAFETY: the queue family was requested above; the create infos outlive the calls.
-        let (queue, commands, timeline) = unsafe {
-            let pool = vk::CommandPoolCreateInfo::default()
-                .queue_family_index(family)
-                .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-            let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
-            (
-                raw.get_device_queue(family, 0),
-                raw.create_command_pool(&pool, None).with_context(opening)?,
-                raw.create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None)
-                    .with_context(opening)?,
-            )
+        });
+        let pool = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(family)
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let semaphore = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the queue family was requested above; the create infos outlive the calls. Where one object is missing,
+        // the others are destroyed, and then the device.
+        let (queue, allocator, commands, timeline) = unsafe {
+            let (queue, commands) = (raw.get_device_queue(family, 0), raw.create_command_pool(&pool, None));
+            let timeline = raw.create_semaphore(&semaphore, None);
+            let made = allocated.map_err(anyhow::Error::from);
+            match made.and_then(|allocator| Ok((allocator, commands?, timeline?))) {
+                Ok((allocator, commands, timeline)) => (queue, allocator, commands, timeline),
+                Err(error) => {
+                    raw.destroy_semaphore(timeline.unwrap_or_default(), None);
+                    raw.destroy_command_pool(commands.unwrap_or_default(), None);
+                    raw.destroy_device(None);
+                    return Err(error).with_context(opening);
+                }
+            }
         };
         let kept_pipelines = KeptPipelines::open(&raw, &properties);
         let device = Arc::new(Self {
@@ -537,6 +551,11 @@ impl Device {
             family,
             time_slices: SliceTimes::new(surface.is_some(), time_slices, is_software),
             instance,
+            timestamp_bits: match (properties.limits.timestamp_compute_and_graphics, bits) {
+                (vk::FALSE, _) => 0,
+                (_, 64..) => u64::MAX,
+                (_, bits) => (1 << bits) - 1,
+            },
         });
         Ok(device)
     }
@@ -545,6 +564,19 @@ impl Device {
     #[must_use]
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Whether commands can be timed.
+    pub(super) fn has_timestamps(&self) -> bool {
+        self.timestamp_bits != 0
+    }
+
+    /// Milliseconds between two timestamps; the counter may have started again in between.
+    pub(super) fn ms_between(&self, from: u64, to: u64) -> f64 {
+        let ticks = to.wrapping_sub(from) & self.timestamp_bits;
+        // More than half of the counter: the second is the earlier one.
+        let ticks = if ticks > self.timestamp_bits / 2 { 0 } else { ticks };
+        ticks as f64 * f64::from(self.limits.timestamp_period) * 1e-6
     }
 
     /// Whether the validation layer is enabled.

@@ -15,9 +15,8 @@ use ash::vk;
 use super::access::Access;
 use super::bind::{Bindings, Descriptor, Resource, Sampled};
 use super::cache::{PipelineKey, RasterKey};
-use super::device::{Device, lock};
+use super::device::{Device, is_lost, lock};
 use super::memory::{Buffer, Image};
-use super::pace::Interrupted;
 use super::recording::{
     Dispatch, Groups, IndirectGroups, Own, Pass, RecordedWork, Recording, Repeat, Target, bind_own, bind_sets,
     push_constants,
@@ -607,7 +606,7 @@ impl<'a> Frame<'a> {
         let mut states = before.clone();
         let barriers = sync::barriers(&uses, &mut states);
         let begun = Cell::new(0);
-        let timed = device.limits.timestamp_compute_and_graphics == vk::TRUE && !passes.is_empty();
+        let timed = device.has_timestamps() && !passes.is_empty();
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
         let wanted: Vec<PipelineKey> = passes.iter().flat_map(|pass| pass.pipelines.clone()).collect();
         let keys: Vec<&PipelineKey> = wanted.iter().collect();
@@ -635,18 +634,14 @@ impl<'a> Frame<'a> {
             outcome
         };
         drop(own);
-        let is_known = match &outcome {
-            Ok(_) => true,
-            Err(error) if error.is::<Interrupted>() => {
-                states = before;
-                sync::barriers(&uses[..begun.get()], &mut states);
-                true
-            }
-            Err(_) => false,
-        };
+        let lost = outcome.as_ref().is_err_and(is_lost);
+        if outcome.is_err() {
+            states = before;
+            sync::barriers(&uses[..begun.get()], &mut states);
+        }
         for (id, target) in &targets {
-            // The state of the resources after a failed frame is unknown.
-            let state = if is_known { states.get(id).copied() } else { None }.unwrap_or_default();
+            // Nothing is known of the resources of a lost device.
+            let state = if lost { None } else { states.get(id).copied() }.unwrap_or_default();
             match target {
                 Target::Buffer(buffer) => *lock(&buffer.state) = state,
                 Target::Image(image) => *lock(&image.state) = state,

@@ -6,13 +6,15 @@
 pub const PUSH_DESCRIPTORS: u32 = 16;
 /// Storage images and storage texel buffers in one shader stage.
 pub const STORAGE_IMAGES: u32 = 16;
+/// Sampled images with samplers in one shader stage: the textures of a material and the tables of the G-buffer.
+pub const SAMPLED_IMAGES: u32 = 20;
 /// Storage buffers in one shader stage.
 pub const STORAGE_BUFFERS: u32 = 16;
 /// Storage buffers in one shader stage where lookup tables are storage buffers (`tables.rs`). Vulkan's Roadmap 2022
 /// profile has 30.
 pub const STORAGE_BUFFERS_AND_TABLES: u32 = 28;
 /// Colour attachments of a raster pass.
-pub const COLOR_TARGETS: u32 = 7;
+pub const COLOR_TARGETS: u32 = 8;
 /// Texels that a texel buffer must hold for lookup tables to be texel buffers: a picture's depths, textures of a small
 /// scene.
 pub const LEAST_TEXELS: u32 = 1 << 22;

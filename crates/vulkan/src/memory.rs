@@ -87,7 +87,7 @@ impl Buffer {
     /// shader reads, and is named [`NOTHING`].
     ///
     /// # Errors
-    /// When memory is short.
+    /// When a shader cannot bind so much of the device's own memory, or memory is short.
     pub fn new(device: &Arc<Device>, name: &str, bytes: u64, place: Place) -> Result<Self> {
         Self::create(device, name, bytes, place, None)
     }
@@ -114,11 +114,13 @@ impl Buffer {
         let name = if bytes == 0 { NOTHING } else { name };
         let creating = || format!("creating buffer \"{name}\" of {bytes} bytes");
         let bytes = bytes.max(16);
-        if texels.is_some() && bytes > device.max_storage_bytes() && !device.offers().texel_buffers {
-            bail!(TooLarge {
-                what: creating(),
-                limit: format!("binds at most {} bytes of one", device.max_storage_bytes())
-            });
+        let is_bound = match texels {
+            Some(_) => !device.offers().texel_buffers,
+            None => matches!(place, Place::Device | Place::Counters),
+        };
+        if is_bound && bytes > device.max_storage_bytes() {
+            let limit = format!("binds at most {} bytes of one", device.max_storage_bytes());
+            bail!(TooLarge { what: creating(), limit });
         }
         let texels = texels.filter(|_| device.offers().texel_buffers);
         let most = u64::from(device.limits.max_texel_buffer_elements);
@@ -171,6 +173,7 @@ impl Buffer {
                 host_copy,
                 device: device.clone(),
             };
+            device.note("buffer", name, requirements.size);
             let bound = device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset());
             buffer.allocation = Mutex::new(Some(allocation));
             bound.with_context(creating)?;
@@ -179,7 +182,6 @@ impl Buffer {
                     vk::BufferViewCreateInfo::default().buffer(raw).format(format).offset(0).range(vk::WHOLE_SIZE);
                 buffer.view = device.raw.create_buffer_view(&info, None).with_context(creating)?;
             }
-            device.note("buffer", name, requirements.size);
             device.name(raw, name);
             Ok(buffer)
         }
@@ -330,6 +332,7 @@ impl Image {
                 allocation: Mutex::new(None),
                 device: device.clone(),
             };
+            device.note("image", name, requirements.size);
             let bound = device.raw.bind_image_memory(raw, allocation.memory(), allocation.offset());
             image.allocation = Mutex::new(Some(allocation));
             bound.with_context(creating)?;
@@ -340,7 +343,6 @@ impl Image {
                 .format(desc.format)
                 .subresource_range(image.range());
             image.view = device.raw.create_image_view(&view, None).with_context(creating)?;
-            device.note("image", name, requirements.size);
             device.name(raw, name);
             Ok(image)
         }

@@ -66,11 +66,13 @@ fn take(wish: Wish) -> Result<Validated> {
             None => break,
             Some(other) => match other.device.upgrade() {
                 Some(device) if other.wish == wish && wish.is_shared() => return Ok(Validated::Shared(device)),
-                Some(device) => bail!(NotOpened::Validated {
-                    device: device.info().name.clone(),
-                    has: format!("{:?}", other.wish),
-                    wanted: format!("{wish:?}"),
-                }),
+                Some(device) => {
+                    let has = format!("{:?}", other.wish);
+                    // The last owner of the device returns its lease, which locks the slot.
+                    drop(slot);
+                    let (device, wanted) = (device.info().name.clone(), format!("{wish:?}"));
+                    bail!(NotOpened::Validated { device, has, wanted })
+                }
                 None => slot = FREED.wait(slot).unwrap_or_else(std::sync::PoisonError::into_inner),
             },
         }
@@ -129,7 +131,7 @@ impl Device {
         };
         let is_validated = turn.is_some();
         let right = turn.map(|turn| Box::new(turn) as RightToValidate);
-        let device = Self::open_on(Instance::new(right, &[])?, choice, None, time_slices)?;
+        let device = Self::open_on(Arc::new(Instance::new(right, &[])?), choice, None, time_slices)?;
         if is_validated {
             share(&device);
         }

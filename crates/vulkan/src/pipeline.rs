@@ -99,7 +99,9 @@ impl Device {
             .address_mode_u(desc.wrap[0])
             .address_mode_v(desc.wrap[1])
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .max_lod(if desc.mip.is_some() { vk::LOD_CLAMP_NONE } else { 0.0 });
+            // A quarter still rounds to level 0, and does not count as magnification (the specification's note on
+            // VkSamplerCreateInfo).
+            .max_lod(if desc.mip.is_some() { vk::LOD_CLAMP_NONE } else { 0.25 });
         // SAFETY: a valid create info.
         let sampler = unsafe { self.raw.create_sampler(&info, None) }.context("creating a sampler")?;
         self.note("sampler", "sampler", 0);
@@ -110,7 +112,7 @@ impl Device {
     /// The layout of a shared descriptor set (set 1 or 2).
     pub(super) fn set_layout(&self, layout: &'static SetLayout) -> Result<vk::DescriptorSetLayout> {
         let mut caches = lock(&self.caches);
-        if let Some(&known) = caches.set_layouts.get(layout.name) {
+        if let Some(&known) = caches.set_layouts.get(layout) {
             return Ok(known);
         }
         let slots = self.slots(layout.bindings);
@@ -118,14 +120,14 @@ impl Device {
         // SAFETY: a valid create info, taken from reflection.
         let made = unsafe { self.raw.create_descriptor_set_layout(&info, None) }
             .with_context(|| format!("creating the layout of the {}", layout.name))?;
-        caches.set_layouts.insert(layout.name, made);
+        caches.set_layouts.insert(layout, made);
         Ok(made)
     }
 
     pub(super) fn layout(&self, program: &'static Program) -> Result<Layout> {
         let shared = program.sets.iter().map(|set| self.set_layout(set.layout)).collect::<Result<Vec<_>>>()?;
         let mut caches = lock(&self.caches);
-        if let Some(&layout) = caches.layouts.get(program.name) {
+        if let Some(&layout) = caches.layouts.get(program) {
             return Ok(layout);
         }
         let creating = || format!("creating the layout of \"{}\"", program.name);
@@ -144,9 +146,15 @@ impl Device {
             if program.push_bytes > 0 {
                 info = info.push_constant_ranges(&ranges);
             }
-            Layout { set, pipeline: self.raw.create_pipeline_layout(&info, None).with_context(creating)? }
+            match self.raw.create_pipeline_layout(&info, None) {
+                Ok(pipeline) => Layout { set, pipeline },
+                Err(error) => {
+                    self.raw.destroy_descriptor_set_layout(set, None);
+                    return Err(error).with_context(creating);
+                }
+            }
         };
-        caches.layouts.insert(program.name, layout);
+        caches.layouts.insert(program, layout);
         Ok(layout)
     }
 
@@ -271,7 +279,7 @@ impl Device {
     fn build(&self, key: &PipelineKey, modules: &mut Vec<vk::ShaderModule>) -> Result<vk::Pipeline, vk::Result> {
         let program = key.program;
         // The layout was created when the pass was described.
-        let layout = lock(&self.caches).layouts[program.name].pipeline;
+        let layout = lock(&self.caches).layouts[program].pipeline;
         let mut stages = Vec::new();
         for (index, stage) in program.stages.iter().enumerate() {
             let replaced = lock(&self.caches).replaced.get(&(program.name, index)).cloned();

@@ -82,8 +82,8 @@ struct Swapchain {
 /// A window with its surface, swapchain and user interface.
 pub struct Presenter {
     device: Arc<Device>,
-    window: Arc<dyn Windowed>,
     surface: Surface,
+    window: Arc<dyn Windowed>,
     calls: khr::swapchain::Device,
     format: vk::SurfaceFormatKHR,
     swapchain: Option<Swapchain>,
@@ -104,28 +104,15 @@ impl Presenter {
     /// When there is no loader, no device that can present, or the window has no surface.
     pub fn open(window: Arc<dyn Windowed>, choice: &DeviceChoice, validate: bool) -> Result<(Arc<Device>, Self)> {
         let turn = validate.then(|| open::for_a_window(choice)).transpose()?;
-        let instance = Instance::new(turn, extensions(&*window)?)?;
-        let surface = Surface::new(&instance.entry, &instance.raw, &*window)?;
+        let instance = Arc::new(Instance::new(turn, extensions(&*window)?)?);
+        let surface = Surface::new(&instance, &*window)?;
         let device = Device::open_on(instance, choice, Some(&surface), true)?;
         if validate {
             open::share(&device);
         }
-        // SAFETY: plain queries of a live surface, and objects of a live device.
-        let (formats, pool, acquired, finished) = unsafe {
-            let pool = vk::CommandPoolCreateInfo::default()
-                .queue_family_index(device.family)
-                .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-            let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
-            (
-                surface
-                    .calls
-                    .get_physical_device_surface_formats(device.physical, surface.raw)
-                    .context("asking for formats of the window")?,
-                device.raw.create_command_pool(&pool, None).context("making a command pool")?,
-                device.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None).context("making a semaphore")?,
-                device.raw.create_fence(&signalled, None).context("making a fence")?,
-            )
-        };
+        // SAFETY: a plain query of a live surface.
+        let formats = unsafe { surface.calls.get_physical_device_surface_formats(device.physical, surface.raw) }
+            .context("asking for formats of the window")?;
         let encoded = |format: &&vk::SurfaceFormatKHR| {
             matches!(format.format, vk::Format::B8G8R8A8_UNORM | vk::Format::R8G8B8A8_UNORM)
                 && format.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR
@@ -148,22 +135,34 @@ impl Presenter {
         )
         .context("making what draws the panels")?;
         let calls = khr::swapchain::Device::new(&device.instance.raw, &device.raw);
-        let presenter = Self {
+        // Null handles until they are made: dropping the presenter destroys what there is.
+        let mut presenter = Self {
             device: device.clone(),
-            window,
             surface,
+            window,
             calls,
             format,
             swapchain: None,
             stale: true,
-            pool,
-            acquired,
-            finished,
+            pool: vk::CommandPool::null(),
+            acquired: vk::Semaphore::null(),
+            finished: vk::Fence::null(),
             commands: None,
             slots: Vec::new(),
             overlay: Some(overlay),
             freed: Vec::new(),
         };
+        let pool = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(device.family)
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+        let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
+        let (raw, semaphore) = (&device.raw, vk::SemaphoreCreateInfo::default());
+        // SAFETY: objects of a live device.
+        unsafe {
+            presenter.pool = raw.create_command_pool(&pool, None).context("making a command pool")?;
+            presenter.acquired = raw.create_semaphore(&semaphore, None).context("making a semaphore")?;
+            presenter.finished = raw.create_fence(&signalled, None).context("making a fence")?;
+        }
         Ok((device, presenter))
     }
 
@@ -226,8 +225,14 @@ impl Presenter {
         drop(queue);
         match shown {
             Ok(suboptimal) => self.stale |= suboptimal,
-            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.stale = true,
-            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => self.renew_surface()?,
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
+                self.stale = true;
+                return Ok(Presented::Changed);
+            }
+            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => {
+                self.renew_surface()?;
+                return Ok(Presented::Changed);
+            }
             Err(error) => return Err(error).context("showing a picture in the window"),
         }
         Ok(Presented::Shown)
@@ -345,26 +350,21 @@ impl Presenter {
             .present_mode(vk::PresentModeKHR::FIFO)
             .clipped(true)
             .old_swapchain(old.as_ref().map_or(vk::SwapchainKHR::null(), |old| old.raw));
-        // SAFETY: the surface is alive, and nothing of the old swapchain is in use once the queue is idle.
+        // SAFETY: the surface is alive.
+        let made = unsafe { self.calls.create_swapchain(&info, None) };
+        let (images, views, done) = (Vec::new(), Vec::new(), Vec::new());
+        self.swapchain = made.ok().map(|raw| Swapchain { raw, images, views, done, extent });
+        self.retire(old)?;
+        if made == Err(vk::Result::ERROR_SURFACE_LOST_KHR) {
+            self.renew_surface()?;
+            return Ok(false);
+        }
+        made.with_context(making)?;
+        // What is made before an error goes with the next swapchain.
+        self.stale = true;
+        let Some(swapchain) = &mut self.swapchain else { return Ok(false) };
+        // SAFETY: the swapchain is alive.
         unsafe {
-            let made = self.calls.create_swapchain(&info, None);
-            if let Some(old) = old {
-                let queue = lock(&self.device.queue);
-                self.device.raw.queue_wait_idle(*queue).context("waiting for the window")?;
-                drop(queue);
-                self.destroy_swapchain(&old);
-            }
-            if made == Err(vk::Result::ERROR_SURFACE_LOST_KHR) {
-                self.renew_surface()?;
-                return Ok(false);
-            }
-            let mut swapchain = Swapchain {
-                raw: made.with_context(making)?,
-                images: Vec::new(),
-                views: Vec::new(),
-                done: Vec::new(),
-                extent,
-            };
             swapchain.images = self.calls.get_swapchain_images(swapchain.raw).with_context(making)?;
             for &image in &swapchain.images {
                 let view = vk::ImageViewCreateInfo::default()
@@ -376,7 +376,6 @@ impl Presenter {
                 let semaphore = vk::SemaphoreCreateInfo::default();
                 swapchain.done.push(self.device.raw.create_semaphore(&semaphore, None).with_context(making)?);
             }
-            self.swapchain = Some(swapchain);
         }
         self.stale = false;
         Ok(true)
@@ -384,27 +383,26 @@ impl Presenter {
 
     /// Creates the surface again after its loss, which also invalidates its swapchain.
     fn renew_surface(&mut self) -> Result<()> {
-        if let Some(old) = self.swapchain.take() {
-            let queue = lock(&self.device.queue);
-            // SAFETY: nothing of the swapchain is in use once the queue is idle.
-            unsafe {
-                self.device.raw.queue_wait_idle(*queue).context("waiting for the window")?;
-                self.destroy_swapchain(&old);
-            }
-        }
-        self.surface.destroy();
-        let instance = &self.device.instance;
-        self.surface = Surface::new(&instance.entry, &instance.raw, &*self.window)?;
+        let old = self.swapchain.take();
         self.stale = true;
+        self.retire(old)?;
+        self.surface = Surface::new(&self.device.instance, &*self.window)?;
         Ok(())
     }
 
-    unsafe fn destroy_swapchain(&self, swapchain: &Swapchain) {
-        // SAFETY: the caller guarantees that nothing of the swapchain is in use.
+    /// Waits for the queue and destroys a swapchain.
+    fn retire(&self, swapchain: Option<Swapchain>) -> Result<()> {
+        let Some(swapchain) = swapchain else { return Ok(()) };
+        let raw = &self.device.raw;
+        // SAFETY: nothing of the swapchain is in use once the queue is idle, or the device lost.
         unsafe {
-            swapchain.views.iter().for_each(|view| self.device.raw.destroy_image_view(*view, None));
-            swapchain.done.iter().for_each(|semaphore| self.device.raw.destroy_semaphore(*semaphore, None));
+            let queue = lock(&self.device.queue);
+            let idle = raw.queue_wait_idle(*queue);
+            drop(queue);
+            swapchain.views.iter().for_each(|view| raw.destroy_image_view(*view, None));
+            swapchain.done.iter().for_each(|semaphore| raw.destroy_semaphore(*semaphore, None));
             self.calls.destroy_swapchain(swapchain.raw, None);
+            idle.context("waiting for the window")
         }
     }
 
@@ -508,17 +506,15 @@ impl Presenter {
 
 impl Drop for Presenter {
     fn drop(&mut self) {
-        // SAFETY: nothing is in use once the device is idle; the surface goes after its swapchain and before the
-        // window.
+        // The surface goes after its swapchain and before the window.
+        let swapchain = self.swapchain.take();
+        let _ = self.retire(swapchain);
+        // SAFETY: nothing is in use once the queue is idle.
         unsafe {
             let queue = lock(&self.device.queue);
             let _ = self.device.raw.queue_wait_idle(*queue);
             drop(queue);
             drop(self.overlay.take());
-            if let Some(swapchain) = self.swapchain.take() {
-                self.destroy_swapchain(&swapchain);
-            }
-            self.surface.destroy();
             self.device.raw.destroy_semaphore(self.acquired, None);
             self.device.raw.destroy_fence(self.finished, None);
             self.device.raw.destroy_command_pool(self.pool, None);

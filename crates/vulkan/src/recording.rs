@@ -141,7 +141,7 @@ pub(super) struct Recording<'f> {
     /// Null when the device has no timestamps.
     pub(super) queries: vk::QueryPool,
     pub(super) without_barriers: bool,
-    /// Number of passes whose barriers have been recorded, under time-sliced submission.
+    /// Number of passes whose barriers have been submitted.
     pub(super) begun: &'f Cell<usize>,
 }
 
@@ -152,7 +152,7 @@ impl Recording<'_> {
     /// # Safety
     /// Every handle of the passes is alive, and nothing else is recorded with the pool.
     pub(super) unsafe fn at_once(&self, passes: Vec<Pass<'_>>, barriers: &[Vec<Barrier>]) -> Result<Vec<f64>> {
-        let &Self { device, from, targets, pipelines, queries, without_barriers, .. } = self;
+        let &Self { device, from, targets, pipelines, queries, without_barriers, begun } = self;
         let (raw, timed) = (&device.raw, queries != vk::QueryPool::null());
         let mut ticks = vec![0_u64; 2 * passes.len()];
         let names: Vec<String> = passes.iter().map(|pass| pass.name.clone()).collect();
@@ -168,6 +168,7 @@ impl Recording<'_> {
                     // one.
                     if index > 0 && !device.validates() && !pipelines.ready(&pass.pipelines) {
                         submit(device, used[used.len() - 1])?;
+                        begun.set(index);
                         used.push(begin(device, from)?);
                     }
                     let made = pipelines.wait_for(&pass.pipelines)?;
@@ -187,7 +188,9 @@ impl Recording<'_> {
                     }
                     label(device, commands, None);
                 }
-                submit(device, used[used.len() - 1])
+                submit(device, used[used.len() - 1])?;
+                begun.set(names.len());
+                Ok(())
             };
             let recorded = record_all();
             // Submitted work is waited for even when the rest could not be submitted.
@@ -202,8 +205,7 @@ impl Recording<'_> {
             raw.free_command_buffers(from, &used);
             outcome?;
         }
-        let period = f64::from(device.limits.timestamp_period) * 1e-6;
-        Ok(ticks.chunks_exact(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * period).collect())
+        Ok(ticks.chunks_exact(2).map(|pair| device.ms_between(pair[0], pair[1])).collect())
     }
 }
 

@@ -41,20 +41,27 @@ pub struct Constant {
     pub float: bool,
 }
 
-/// Programs are equal when their names are.
-impl PartialEq for Program {
-    fn eq(&self, other: &Self) -> bool {
-        self.name == other.name
-    }
+/// A program or layout is equal to itself alone: another crate may have one of the same name.
+macro_rules! equal_by_address {
+    ($Type:ty) => {
+        impl PartialEq for $Type {
+            fn eq(&self, other: &Self) -> bool {
+                std::ptr::eq(self, other)
+            }
+        }
+
+        impl Eq for $Type {}
+
+        impl std::hash::Hash for $Type {
+            fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+                std::ptr::hash(self, state);
+            }
+        }
+    };
 }
 
-impl Eq for Program {}
-
-impl std::hash::Hash for Program {
-    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
-        self.name.hash(state);
-    }
-}
+equal_by_address!(Program);
+equal_by_address!(SetLayout);
 
 impl Program {
     /// Bytes of SPIR-V that the driver receives for these specialization constants.

@@ -2,14 +2,26 @@
 //!
 //! Read the Vulkan specification, chapter Window System Integration.
 
+use std::sync::Arc;
+
 use ash::{khr, vk};
 
-/// A `VkSurfaceKHR`; its owner destroys it before the instance.
-#[derive(Clone)]
+use super::device::{Instance, QUEUE};
+
+/// A `VkSurfaceKHR`; its owner drops it after its swapchain and before its window.
 #[cfg_attr(not(feature = "window"), allow(dead_code, reason = "only a window has one"))]
 pub(super) struct Surface {
     pub(super) calls: khr::surface::Instance,
     pub(super) raw: vk::SurfaceKHR,
+    /// Destroyed after the surface.
+    pub(super) _instance: Arc<Instance>,
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: the owner has destroyed the swapchain.
+        unsafe { self.calls.destroy_surface(self.raw, None) };
+    }
 }
 
 impl Surface {
@@ -19,10 +31,12 @@ impl Surface {
         unsafe { self.calls.get_physical_device_surface_support(physical, family, self.raw) }.unwrap_or_default()
     }
 
-    /// Whether any queue family of a device can present to the surface.
+    /// Whether a queue family of a device can draw, compute and present to the surface.
     pub(super) fn is_shown_by(&self, instance: &ash::Instance, physical: vk::PhysicalDevice) -> bool {
         // SAFETY: a plain query.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
-        (0..families.len() as u32).any(|family| self.is_shown_by_family(physical, family))
+        families.iter().enumerate().any(|(family, properties)| {
+            properties.queue_flags.contains(QUEUE) && self.is_shown_by_family(physical, family as u32)
+        })
     }
 }

@@ -148,7 +148,12 @@ fn step(resource: ResourceId, is_image: bool, masks: Masks, state: &mut Resource
     }
     state.visible_stages |= masks.stages;
     state.visible_access |= masks.access;
-    Some(barrier(state.write_stages, state.write_access, is_image.then_some((state.layout, state.layout))))
+    // The state says that every access in it sees the write in every stage of it: so the barrier makes it.
+    Some(Barrier {
+        dst_stages: state.visible_stages,
+        dst_access: state.visible_access,
+        ..barrier(state.write_stages, state.write_access, is_image.then_some((state.layout, state.layout)))
+    })
 }
 
 /// The write accesses among `access`: only writes have to be made available.
@@ -185,6 +190,21 @@ mod tests {
         let all = barriers(&[write.clone(), write.clone(), read, write], &mut HashMap::new());
         assert_eq!(all.iter().map(Vec::len).collect::<Vec<_>>(), [0, 1, 1, 1]);
         assert_eq!(all[3][0].src_stages, vk::PipelineStageFlags2::COMPUTE_SHADER);
+    }
+
+    #[test]
+    fn a_write_is_visible_to_all_that_the_state_says() {
+        let by = |access, shaders| vec![Use { resource: 1, is_image: false, access, shaders }];
+        let (fragment, compute) = (vk::ShaderStageFlags::FRAGMENT, vk::ShaderStageFlags::COMPUTE);
+        let passes = [
+            by(Access::StorageWrite, compute),
+            by(Access::UniformRead, fragment),
+            by(Access::StorageRead, compute),
+            by(Access::StorageRead, fragment),
+        ];
+        let all = barriers(&passes, &mut HashMap::new());
+        assert_eq!(all.iter().map(Vec::len).collect::<Vec<_>>(), [0, 1, 1, 0]);
+        assert!(all[2][0].dst_stages.contains(vk::PipelineStageFlags2::FRAGMENT_SHADER));
     }
 
     #[test]

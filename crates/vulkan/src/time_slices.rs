@@ -258,10 +258,12 @@ impl Recording<'_> {
         drawn: &mut Drawn,
     ) -> Result<()> {
         let made = self.pipelines.wait_for(&pass.pipelines)?;
-        let query = 2 * index as u32;
+        let (query, timed) = (2 * index as u32, self.queries != vk::QueryPool::null());
         // SAFETY: the command buffer is recording; the caller of `in_turns` keeps all handles alive.
         unsafe {
-            self.device.raw.cmd_reset_query_pool(commands, self.queries, query, 2);
+            if timed {
+                self.device.raw.cmd_reset_query_pool(commands, self.queries, query, 2);
+            }
             record_barriers(self.device, commands, barriers, self.targets, self.without_barriers);
             if let RecordedWork::Dispatch(Dispatch { groups, .. }) = &pass.work {
                 drawn.groups[index] = match groups {
@@ -275,13 +277,17 @@ impl Recording<'_> {
                 };
             }
             label(self.device, commands, Some(&pass.name));
-            write_first_timestamp(self.device, commands, self.queries, query);
+            if timed {
+                write_first_timestamp(self.device, commands, self.queries, query);
+            }
             match pass.work {
                 RecordedWork::Record(record) => record(self.device, commands, &made),
                 RecordedWork::Dispatch(work) => work.record(self.device, commands, made[0], None),
                 RecordedWork::Repeat(_) => unreachable!("{REPEATED}"),
             }
-            self.device.raw.cmd_write_timestamp2(commands, ALL, self.queries, query + 1);
+            if timed {
+                self.device.raw.cmd_write_timestamp2(commands, ALL, self.queries, query + 1);
+            }
             label(self.device, commands, None);
         }
         Ok(())
@@ -296,6 +302,9 @@ impl Recording<'_> {
         unsafe {
             to_host(device, commands);
             let submitted = submit(device, commands);
+            if submitted.is_ok() {
+                self.begun.set(self.begun.get() + passes.len());
+            }
             let waited = wait(device).with_context(|| {
                 let names: Vec<&str> = passes.iter().map(|&index| drawn.names[index].0.as_str()).collect();
                 format!("waiting for the passes {}", names.join(", "))
@@ -304,7 +313,6 @@ impl Recording<'_> {
             submitted.and(waited)?;
         }
         device.time_slices.turns.fetch_add(1, Ordering::Relaxed);
-        self.begun.set(self.begun.get() + passes.len());
         let whole_ms = start.elapsed().as_secs_f64() * 1e3;
         let times = passes.iter().map(|&index| self.ms_between(2 * index as u32)).collect::<Result<Vec<f64>>>()?;
         let took = Took { ms: times.iter().sum(), whole_ms };
@@ -318,15 +326,17 @@ impl Recording<'_> {
         Ok(())
     }
 
-    /// Milliseconds between two timestamps that have been written.
+    /// Milliseconds between two timestamps that have been written; 0 on a device without timestamps.
     fn ms_between(&self, query: u32) -> Result<f64> {
+        if self.queries == vk::QueryPool::null() {
+            return Ok(0.0);
+        }
         let mut ticks = [0_u64; 2];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the pool has both queries, whose commands have executed.
         unsafe { self.device.raw.get_query_pool_results(self.queries, query, &mut ticks, flags) }
             .context("reading timestamps")?;
-        let period = f64::from(self.device.limits.timestamp_period) * 1e-6;
-        Ok(ticks[1].saturating_sub(ticks[0]) as f64 * period)
+        Ok(self.device.ms_between(ticks[0], ticks[1]))
     }
 
     /// Draws a pass by itself; its time in milliseconds.
@@ -504,6 +514,7 @@ impl Recording<'_> {
     ) -> Result<Took> {
         let (device, raw, timed) = (self.device, &self.device.raw, self.queries != vk::QueryPool::null());
         device.time_slices.go_on()?;
+        let begun = self.begun.get();
         // SAFETY: the command buffer is recorded here and waited for before it is freed.
         let whole_ms = unsafe {
             let commands = begin(device, self.from)?;
@@ -522,6 +533,9 @@ impl Recording<'_> {
             label(device, commands, None);
             let start = Instant::now();
             let submitted = submit(device, commands);
+            if submitted.is_err() {
+                self.begun.set(begun);
+            }
             let waited = wait(device).with_context(|| format!("waiting for the pass {name}"));
             let whole_ms = start.elapsed().as_secs_f64() * 1e3;
             raw.free_command_buffers(self.from, &[commands]);

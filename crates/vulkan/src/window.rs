@@ -4,11 +4,13 @@
 //! `raw-window-handle` and `ash-window`.
 
 use std::ffi::c_char;
+use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use ash::khr;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
+use super::device::Instance;
 use super::surface::Surface;
 
 /// A window with the handles that a Vulkan surface needs.
@@ -22,18 +24,14 @@ pub(super) fn extensions(window: &dyn Windowed) -> Result<&'static [*const c_cha
 }
 
 impl Surface {
-    pub(super) fn new(entry: &ash::Entry, instance: &ash::Instance, window: &dyn Windowed) -> Result<Self> {
+    pub(super) fn new(instance: &Arc<Instance>, window: &dyn Windowed) -> Result<Self> {
         let making = || "making a Vulkan surface of the window";
         let display = window.display_handle().with_context(making)?;
         let handle = window.window_handle().with_context(making)?;
+        let (entry, calls) = (&instance.entry, khr::surface::Instance::new(&instance.entry, &instance.raw));
         // SAFETY: both handles are alive while `window` is borrowed; the presenter keeps it longer than the surface.
-        let raw = unsafe { ash_window::create_surface(entry, instance, display.as_raw(), handle.as_raw(), None) }
+        let raw = unsafe { ash_window::create_surface(entry, &instance.raw, display.as_raw(), handle.as_raw(), None) }
             .with_context(making)?;
-        Ok(Self { calls: khr::surface::Instance::new(entry, instance), raw })
-    }
-
-    pub(super) fn destroy(&self) {
-        // SAFETY: the swapchain on it is gone.
-        unsafe { self.calls.destroy_surface(self.raw, None) };
+        Ok(Self { calls, raw, _instance: instance.clone() })
     }
 }
