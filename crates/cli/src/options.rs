@@ -519,13 +519,14 @@ impl PictureOptions {
     /// # Errors
     /// Never: the rung exists.
     pub fn colour_of(&self, scene: &Scene, knobs: &mut Knobs) -> Result<()> {
-        let chosen = self.set.iter().any(|choice| choice.starts_with("colour="));
         let disperses = || scene.meshes.iter().any(|mesh| scene.materials[mesh.material].disperses());
-        if self.model == Some(Model::Global) && !chosen && disperses() {
-            knobs.set("colour=spectral:16")
-        } else {
-            Ok(())
-        }
+        if self.leaves_colour() && disperses() { knobs.set("colour=spectral:16") } else { Ok(()) }
+    }
+
+    /// Whether the scene chooses between RGB and spectral rendering: under `--model global` without `--set colour`.
+    #[must_use]
+    pub fn leaves_colour(&self) -> bool {
+        self.model == Some(Model::Global) && !self.set.iter().any(|choice| choice.starts_with("colour="))
     }
 
     /// Knobs of `--model` with the changes of `--set`.

@@ -110,7 +110,7 @@ impl SceneSource for FileSource {
             name: opened.scene().name.clone(),
             camera,
             framed,
-            knobs: (knobs != chosen).then_some(knobs),
+            colour: this.picture.leaves_colour().then_some(knobs.colour),
             warnings: opened.warnings.clone(),
             prices: prices.map(Arc::new),
             original: opened.original.clone(),
@@ -237,6 +237,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let first = is_file(&args.scene.scene).then(|| PathBuf::from(&args.scene.scene));
     let messages = run_window(Start {
         file: first,
+        time: args.scene.time.0,
         size: args.size_is_given.then_some(args.picture.size),
         id: desktop::ID,
         icon: (ICON, icon::pixels(ICON)),

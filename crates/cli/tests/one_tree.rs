@@ -10,12 +10,13 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use etalon::frame::Settings;
-use etalon::gpu::{Device, DeviceChoice};
+use etalon::gpu::Device;
 use etalon::open::Opened;
 use etalon::plan::{Knobs, Model};
 use etalon::prepare::Prepared;
 use etalon::scene::{Camera, Scene};
 use etalon::transport::bvh::Bvh;
+use etalon_testing::gpu::Gpu;
 use etalon_viewer::shared::{Loaded, OpenRequest, Pick, RenderRequest, SceneSource, SharedState};
 use etalon_viewer::worker::Worker;
 
@@ -42,18 +43,22 @@ fn settings(model: Model, more: &[&str]) -> Settings {
 /// The window's thread, without the window.
 #[test]
 fn two_sides_and_a_picked_pixel_take_one_tree() {
+    let gpu = Gpu::open();
     let left = settings(Model::Recursive, &[]);
     let right = settings(Model::Local, &["reflection=ray", "fresnel=exact"]);
+    // The click was made in another view.
+    let mut aside = etalon::study::load("pool").expect("a scene").cameras[0].clone();
+    aside.world_from_camera.translation.x += 0.1;
     let wanted = RenderRequest {
         other: Some(right.knobs.clone()),
-        picked: Some(Pick { number: 1, pixel: [16, 9] }),
+        picked: Some(Pick { number: 1, pixel: [16, 9], size: left.size, seen_from: aside.clone() }),
         ..RenderRequest::new(left.clone())
     };
     let shared = Arc::new(SharedState::new(wanted));
     let (to, woken) = channel();
     let before = Bvh::built();
     let thread = {
-        let (device, shared) = (Device::open(&DeviceChoice::Cpu, false).expect("a device"), shared.clone());
+        let (device, shared) = (gpu.device.clone(), shared.clone());
         let wake = Arc::new(move || to.send(()).unwrap_or_default());
         std::thread::spawn(move || Worker::run(device, shared, Box::new(Pool), wake))
     };
@@ -66,6 +71,7 @@ fn two_sides_and_a_picked_pixel_take_one_tree() {
         assert!(begun.elapsed() < Duration::from_secs(120), "{:?}", seen.error);
         let _ = woken.recv_timeout(Duration::from_millis(200));
     }
+    assert!(shared.seen().trace.is_some_and(|trace| trace.seen_from == aside), "the rays of another view");
     shared.want(|wanted| wanted.quit = true);
     thread.join().expect("the thread ends");
     assert_eq!(Bvh::built() - before, 1, "two renderers and the rays of a pixel");

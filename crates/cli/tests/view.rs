@@ -564,6 +564,15 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     let other = found.pixels().zip(&expected).filter(|(a, b)| a.0 != **b).count();
     assert_eq!((found.dimensions().into(), other), (size, 0), "size and pixels that differ from what is shown");
 
+    // Both sides of a comparison are saved, though the left one was drawn before there were two.
+    std::fs::remove_file(&saved).expect("a file");
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(V, None);
+    viewer.key(S, Some(CONTROL));
+    std::thread::sleep(Duration::from_secs(1));
+    viewer.key(RETURN, None);
+    viewer.until("a saved comparison", |_| saved.is_file().then_some(()));
+
     // A panel that is closed stays closed, and the window has its size of before.
     viewer.resize([1000, 640]);
     std::thread::sleep(Duration::from_secs(1));

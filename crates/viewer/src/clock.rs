@@ -8,6 +8,8 @@ const STEP: f64 = 1e-3;
 pub struct Clock {
     /// Seconds; `None` is the time of the command line, or the rest pose.
     pub time: Option<f64>,
+    /// Time of the command line in seconds; `None` is the rest pose.
+    pub rest: Option<f64>,
     /// Whether the animation plays.
     pub playing: bool,
     /// Seconds of the animation per second.
@@ -18,11 +20,17 @@ pub struct Clock {
 
 impl Default for Clock {
     fn default() -> Self {
-        Self { time: None, playing: false, speed: 1.0, repeats: true }
+        Self { time: None, rest: None, playing: false, speed: 1.0, repeats: true }
     }
 }
 
 impl Clock {
+    /// The shown time in seconds; 0 for the rest pose.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.time.or(self.rest).unwrap_or_default()
+    }
+
     /// Stops, and returns to the time of the command line.
     pub fn stop(&mut self) {
         (self.time, self.playing) = (None, false);
@@ -31,7 +39,7 @@ impl Clock {
     /// Plays or pauses; at the end of what does not repeat, it plays from the beginning.
     pub fn toggle(&mut self, duration: f64) {
         self.playing = !self.playing;
-        if self.playing && !self.repeats && self.time.is_some_and(|time| time >= duration) {
+        if self.playing && !self.repeats && self.seconds() >= duration {
             self.time = Some(0.0);
         }
     }
@@ -45,7 +53,7 @@ impl Clock {
     /// Advances a playing clock by some seconds of the user's time; after `duration` it starts again at 0, or stops.
     pub fn advance(&mut self, seconds: f64, duration: f64) {
         if self.playing && duration > 0.0 {
-            let at = self.time.unwrap_or_default() + seconds * self.speed;
+            let at = self.seconds() + seconds * self.speed;
             self.playing = self.repeats || at < duration;
             self.set(if self.repeats { at.rem_euclid(duration) } else { at }, duration);
         }
@@ -80,5 +88,15 @@ mod tests {
         clock.advance(0.1, 2.0);
         clock.toggle(2.0);
         assert_eq!((clock.time, clock.playing), (Some(0.4), false), "paused");
+    }
+
+    #[test]
+    fn it_goes_on_from_the_time_of_the_command_line() {
+        let mut clock = Clock { rest: Some(1.5), playing: true, ..Clock::default() };
+        assert_eq!(clock.seconds(), 1.5);
+        clock.advance(0.25, 2.0);
+        assert_eq!(clock.time, Some(1.75));
+        clock.stop();
+        assert_eq!((clock.time, clock.seconds()), (None, 1.5));
     }
 }

@@ -72,6 +72,8 @@ pub struct Start {
     pub command: Box<dyn Fn(&View<'_>) -> String>,
     /// File of the scene, which is read again when it changes; `None` for a built-in scene.
     pub file: Option<PathBuf>,
+    /// Animation time of the scene in seconds; `None` is the rest pose.
+    pub time: Option<f64>,
     /// Called with each copied command.
     pub said: Box<dyn Fn(&str)>,
 }

@@ -24,7 +24,7 @@ pub struct View {
     distance: f64,
     moved: bool,
     named: Option<String>,
-    framed: bool,
+    fits: Option<f64>,
 }
 
 /// Directions that a scene is looked at from, as in drawings; the front of a glTF model is +Z.
@@ -83,16 +83,16 @@ pub struct Navigation {
     moved: bool,
     /// Key of the file's camera that was chosen; `None`: the initial one.
     named: Option<String>,
-    /// Whether the initial camera was computed to frame the scene at the size of the picture.
-    framed: bool,
-    /// Whether the current view was: it then fits any picture.
-    fits: bool,
+    /// Aspect ratio that the initial camera was computed for, to frame the scene; `None` for other cameras.
+    framed: Option<f64>,
+    /// Aspect ratio that the current view was computed for, to frame something; `None` for other views.
+    fits: Option<f64>,
 }
 
 impl Navigation {
-    /// Starts at a camera. `framed`: the camera was computed to frame the scene.
+    /// Starts at a camera. `framed`: the aspect ratio that it was computed for, to frame the scene.
     #[must_use]
-    pub fn new(home: Camera, bounds: Bounds, framed: bool) -> Self {
+    pub fn new(home: Camera, bounds: Bounds, framed: Option<f64>) -> Self {
         let size = bounds.radius().max(1e-6);
         let mut new = Self {
             view: home.clone(),
@@ -100,7 +100,7 @@ impl Navigation {
             size,
             bounds,
             home,
-            moved: framed,
+            moved: framed.is_some(),
             named: None,
             framed,
             fits: framed,
@@ -116,8 +116,8 @@ impl Navigation {
         self.words().map_or_else(|| self.view.clone(), |(camera, _)| camera)
     }
 
-    /// The current camera as `--eye`, `--target` and `--fov`, with the camera that these options give. `None` where the
-    /// camera was not moved, is orthographic, or looks straight up or down.
+    /// The current camera as `--eye`, `--target`, `--fov` and, where +Y is not up in the picture, `--up`, with the
+    /// camera that these options give. `None` where the camera was not moved, or is orthographic.
     #[must_use]
     pub fn words(&self) -> Option<(Camera, String)> {
         let Projection::Perspective { fov_y, .. } = self.view.projection else { return None };
@@ -125,9 +125,18 @@ impl Navigation {
         let short = |x: f64| (x * 1e6).round() / 1e6;
         let point = |p: DVec3| DVec3::new(short(p.x), short(p.y), short(p.z));
         let (eye, target, degrees) = (point(self.eye()), point(self.target()), short(fov_y.to_degrees()));
-        let camera = Camera::looking_at(eye, target, DVec3::Y, degrees.to_radians()).ok().filter(|_| self.moved)?;
+        let up = point(self.up());
+        let camera = Camera::looking_at(eye, target, up, degrees.to_radians()).ok().filter(|_| self.moved)?;
         let list = |p: DVec3| format!("{},{},{}", p.x, p.y, p.z);
-        Some((camera, format!("--eye {} --target {} --fov {degrees}", list(eye), list(target))))
+        let rolled = if up == DVec3::Y { String::new() } else { format!(" --up {}", list(up)) };
+        Some((camera, format!("--eye {} --target {} --fov {degrees}{rolled}", list(eye), list(target))))
+    }
+
+    /// Direction that is up in the picture: +Y, unless the camera is rolled or looks straight up or down.
+    fn up(&self) -> DVec3 {
+        let frame = self.view.world_from_camera.matrix3;
+        let is_upright = frame.x_axis.y.abs() < 1e-6 && frame.y_axis.y > 0.5 * POLE;
+        if is_upright { DVec3::Y } else { frame.y_axis }
     }
 
     /// Whether the user moved the camera, or it was computed to frame the scene.
@@ -167,33 +176,32 @@ impl Navigation {
     #[must_use]
     pub fn view(&self) -> View {
         let Self { view, distance, moved, named, fits, .. } = self;
-        View { camera: view.clone(), distance: *distance, moved: *moved, named: named.clone(), framed: *fits }
+        View { camera: view.clone(), distance: *distance, moved: *moved, named: named.clone(), fits: *fits }
     }
 
     /// Returns to a view.
     pub fn return_to(&mut self, to: View) {
         (self.view, self.distance, self.moved, self.named, self.fits) =
-            (to.camera, to.distance, to.moved, to.named, to.framed);
+            (to.camera, to.distance, to.moved, to.named, to.fits);
     }
 
-    /// The least aspect ratio of a picture of this view: in a narrower one, the sides of what a camera of the file
-    /// shows would be cut off. `None` for views that were computed to fit.
+    /// The least aspect ratio of a picture of this view: in a narrower one, the sides would be cut off.
     #[must_use]
-    pub fn least_aspect(&self) -> Option<f64> {
-        (!self.fits).then_some(MADE_FOR)
+    pub fn least_aspect(&self) -> f64 {
+        self.fits.unwrap_or(MADE_FOR)
     }
 
     /// Takes over a scene that was read again. A view that the user moved stays where it is; a camera of the file is
     /// that of the new scene, `named` if it was chosen by name. Where that is gone, the view stays.
-    pub fn stay(&mut self, home: Camera, named: Option<&Camera>, bounds: Bounds, framed: bool) {
-        self.moved |= framed && !self.framed || self.named.is_some() && named.is_none();
+    pub fn stay(&mut self, home: Camera, named: Option<&Camera>, bounds: Bounds, framed: Option<f64>) {
+        self.moved |= framed.is_some() && self.framed.is_none() || self.named.is_some() && named.is_none();
         (self.home, self.bounds, self.size, self.framed) = (home, bounds, bounds.radius().max(1e-6), framed);
         self.follow(named);
     }
 
     /// Follows a change of the animation time: a camera of the file moves with its node unless the user moved it.
     pub fn moment(&mut self, home: Camera, named: Option<&Camera>) {
-        if !self.framed {
+        if self.framed.is_none() {
             self.home = home;
             self.follow(named);
         }
@@ -210,13 +218,13 @@ impl Navigation {
     /// Returns to the initial camera.
     pub fn reset(&mut self) {
         self.go_to(self.home.clone(), None);
-        (self.moved, self.fits) = (self.framed, self.framed);
+        (self.moved, self.fits) = (self.framed.is_some(), self.framed);
     }
 
     /// Goes to a camera; `key` is the word that chooses it in the file.
     pub fn go_to(&mut self, camera: Camera, key: Option<String>) {
         self.view = camera;
-        (self.moved, self.fits) = (false, false);
+        (self.moved, self.fits) = (false, None);
         self.named = key;
         self.distance = self.distance_to_middle();
     }
@@ -228,7 +236,7 @@ impl Navigation {
 
     /// Frames the whole scene, seen from a side.
     pub fn look_from(&mut self, side: ViewSide, aspect: f64) {
-        // Straight up and down there is no horizon, and no command for the view.
+        // Straight up and down there is no horizon for an orbit.
         let direction = (side.direction() + DVec3::Z * (POLE * side.direction().y.abs())).normalize();
         let (center, distance) = (self.bounds.center(), 2.0 * self.size);
         if let Ok(camera) = Camera::looking_at(center + direction * distance, center, DVec3::Y, 1.0) {
@@ -239,7 +247,7 @@ impl Navigation {
 
     /// Frames a box without changing the viewing direction.
     pub fn fit_box(&mut self, bounds: Bounds, aspect: f64) {
-        (self.moved, self.fits) = (true, true);
+        (self.moved, self.fits) = (true, Some(aspect));
         let size = bounds.radius().max(1e-6);
         match &mut self.view.projection {
             Projection::Perspective { fov_y, .. } => {
@@ -281,7 +289,7 @@ impl Navigation {
     pub fn focus(&mut self, at: DVec3) {
         self.moved = true;
         let from = self.eye() - at;
-        let Ok(turned) = Camera::looking_at(at + from * 0.5, at, DVec3::Y, 1.0) else { return };
+        let Ok(turned) = Camera::looking_at(at + from * 0.5, at, self.up(), 1.0) else { return };
         self.view.world_from_camera = turned.world_from_camera;
         self.distance = 0.5 * from.length();
     }
@@ -333,7 +341,7 @@ mod tests {
 
     fn navigation() -> Navigation {
         let bounds = Bounds { min: DVec3::new(-1.0, 0.0, -2.0), max: DVec3::new(3.0, 2.0, 1.0) };
-        Navigation::new(Camera::framing(bounds, 1.5, 0.7), bounds, false)
+        Navigation::new(Camera::framing(bounds, 1.5, 0.7), bounds, None)
     }
 
     fn is_upright(view: &Camera) -> bool {
@@ -412,7 +420,7 @@ mod tests {
             n.look_from(side, 1.5);
             let towards = (n.eye() - n.bounds.center()).normalize();
             assert!(towards.dot(side.direction()) > 0.999_99 && n.words().is_some(), "{name}: {towards}");
-            assert!(n.least_aspect().is_none() && is_upright(&n.camera()), "{name}");
+            assert!(n.least_aspect() == 1.5 && is_upright(&n.camera()), "{name}");
         }
     }
 
@@ -432,25 +440,57 @@ mod tests {
         let (first, second, third) = (at(1.0), at(2.0), at(3.0));
         n.moment(first.clone(), None);
         assert!(n.camera() == first && !n.moved());
-        n.stay(second.clone(), None, n.bounds, false);
+        n.stay(second.clone(), None, n.bounds, None);
         assert!(n.camera() == second && !n.moved(), "a file that is read again");
         n.go_to(first.clone(), Some("a camera".to_owned()));
-        n.stay(first.clone(), Some(&third), n.bounds, false);
+        n.stay(first.clone(), Some(&third), n.bounds, None);
         assert!(n.camera() == third && n.named() == Some("a camera") && !n.moved(), "a camera of the file stays one");
         n.moment(first.clone(), Some(&second));
         assert!(n.camera() == second);
-        n.stay(first.clone(), None, n.bounds, false);
+        n.stay(first.clone(), None, n.bounds, None);
         assert!(n.moved() && n.eye() == DVec3::X * 2.0, "a camera that is gone leaves the view");
         n.reset();
         n.orbit(DVec2::new(0.1, 0.0));
         let turned = n.camera();
         n.moment(second.clone(), None);
-        n.stay(second.clone(), None, n.bounds, false);
+        n.stay(second.clone(), None, n.bounds, None);
         assert!(n.camera() == turned && n.moved());
         n.reset();
         assert!(n.camera() == second);
-        n.stay(third, None, n.bounds, true);
+        n.stay(third, None, n.bounds, Some(1.5));
         assert!(n.moved() && n.eye() == DVec3::X * 2.0, "the file lost its camera");
+    }
+
+    #[test]
+    fn a_framed_view_keeps_the_sides_that_it_was_computed_for() {
+        let mut n = navigation();
+        assert_eq!(n.least_aspect(), MADE_FOR, "a camera of the file");
+        n.fit(0.8);
+        assert_eq!(n.least_aspect(), 0.8);
+        n.reset();
+        assert_eq!(n.least_aspect(), MADE_FOR);
+        let mut n = Navigation::new(n.home, n.bounds, Some(1.2));
+        assert_eq!(n.least_aspect(), 1.2);
+        n.fit(0.8);
+        n.reset();
+        assert_eq!(n.least_aspect(), 1.2, "the initial camera again");
+    }
+
+    #[test]
+    fn a_rolled_camera_keeps_its_roll() {
+        let below = DVec3::new(1.0, -2.0, 0.0);
+        let tilted = DVec3::new(0.3, 0.8, -0.2);
+        for (target, up) in [(DVec3::ZERO, tilted), (DVec3::ZERO, DVec3::NEG_Y), (below, DVec3::Z)] {
+            let home = Camera::looking_at(DVec3::new(1.0, 2.0, 0.0), target, up, 0.7).unwrap();
+            let mut n = Navigation::new(home, navigation().bounds, None);
+            n.zoom(1.0);
+            let (camera, words) = n.words().unwrap();
+            let is_same = camera.world_from_camera.abs_diff_eq(n.view.world_from_camera, 1e-5);
+            assert!(is_same && words.contains(" --up "), "{words}");
+            n.focus(target);
+            let frame = n.view.world_from_camera.matrix3;
+            assert!(frame.y_axis.abs_diff_eq(camera.world_from_camera.matrix3.y_axis, 1e-5), "{words}: {frame}");
+        }
     }
 
     #[test]
@@ -461,6 +501,7 @@ mod tests {
         n.zoom(1.5);
         let (camera, words) = n.words().unwrap();
         assert!(camera.world_from_camera.abs_diff_eq(n.view.world_from_camera, 1e-5), "{words}");
+        assert!(!words.contains("--up"), "{words}");
         assert_eq!(n.camera().world_from_camera, camera.world_from_camera);
         let numbers: Vec<f64> = words.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
         let again = Camera::looking_at(

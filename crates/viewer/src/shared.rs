@@ -11,6 +11,7 @@ use etalon::frame::Settings;
 use etalon::gpu::{Device, PassTime, Replacement};
 use etalon::open::Opened;
 use etalon::pass::tonemap::Counts;
+use etalon::plan::rungs::Colour;
 use etalon::plan::{Effect, Knobs};
 use etalon::prepare::Original;
 use etalon::scene::{Bounds, Camera, Instance, Light, Material, Outline, Scene};
@@ -38,8 +39,8 @@ pub struct Loaded {
     pub prices: Option<Arc<Table>>,
     /// Whether the camera was computed to frame the scene: it then depends on the size of the picture.
     pub framed: bool,
-    /// Knobs to start with, if the scene changes those of the command line.
-    pub knobs: Option<Knobs>,
+    /// Colour to start with, where the scene chooses it.
+    pub colour: Option<Colour>,
     /// Exposure to start with, in stops.
     pub exposure: f32,
     /// Where that exposure comes from; one sentence. `None` where it was chosen by the user.
@@ -59,7 +60,7 @@ impl Loaded {
             warnings: Vec::new(),
             prices: None,
             framed: false,
-            knobs: None,
+            colour: None,
             exposure: 0.0,
             exposure_from: None,
         }
@@ -124,12 +125,16 @@ impl Viewpoint {
 }
 
 /// A pixel to inspect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Pick {
     /// Number of the inspection; a new number inspects again.
     pub number: u64,
     /// Column and row.
     pub pixel: [u32; 2],
+    /// Size of the picture in pixels.
+    pub size: [u32; 2],
+    /// Camera of the picture.
+    pub seen_from: Camera,
 }
 
 /// What the window asks the render thread to draw.
@@ -191,6 +196,16 @@ impl RenderRequest {
         OpenRequest { file: self.file.as_deref(), choice: &self.choice, time: self.time, size: self.settings.size }
     }
 
+    /// The request for one side alone.
+    #[must_use]
+    pub fn of_side(&self, index: usize) -> Self {
+        let mut alone = self.clone();
+        if let (Some(knobs), 1) = (alone.other.take(), index) {
+            alone.settings.knobs = knobs;
+        }
+        alone
+    }
+
     /// Whether both requests draw the same picture; display settings may differ.
     #[must_use]
     pub fn is_same_picture(&self, other: &Self) -> bool {
@@ -216,7 +231,10 @@ impl RenderRequest {
     /// Whether both requests draw and show the same.
     #[must_use]
     pub fn is_as(&self, other: &Self) -> bool {
-        let marks = |w: &Self| (w.surfaces, w.triangles, w.picked, w.meter, w.settings.tonemap, w.settings.exposure);
+        let marks = |w: &Self| {
+            let picked = w.picked.as_ref().map(|picked| picked.number);
+            (w.surfaces, w.triangles, picked, w.meter, w.settings.tonemap, w.settings.exposure)
+        };
         self.is_same_picture(other) && marks(self) == marks(other)
     }
 }
@@ -236,10 +254,11 @@ pub struct SceneFacts {
     pub bounds: Bounds,
     /// Initial camera.
     pub home: Camera,
-    /// Whether the initial camera was computed to frame the scene; a command must then give it by eye and target.
-    pub framed: bool,
-    /// Knobs to start with, if the scene changes those of the command line.
-    pub knobs: Option<Knobs>,
+    /// Aspect ratio that the initial camera was computed for, to frame the scene; a command must then give it by eye
+    /// and target. `None` for other cameras.
+    pub framed: Option<f64>,
+    /// Colour to start with, where the scene chooses it.
+    pub colour: Option<Colour>,
     /// Exposure to start with, in stops.
     pub exposure: f32,
     /// Where that exposure comes from; one sentence.
@@ -304,6 +323,7 @@ impl SceneFacts {
     pub fn of(wanted: &RenderRequest, loaded: &Loaded) -> Result<Self> {
         let scene = loaded.original.scene();
         let bounds = scene.bounds().with_context(|| format!("{}: the scene has nothing to draw", loaded.name))?;
+        let [width, height] = wanted.settings.size;
         Ok(Self {
             scene: wanted.scene,
             time: wanted.time,
@@ -312,8 +332,8 @@ impl SceneFacts {
             name: loaded.name.clone(),
             bounds,
             home: loaded.camera.clone(),
-            framed: loaded.framed,
-            knobs: loaded.knobs.clone(),
+            framed: loaded.framed.then(|| f64::from(width) / f64::from(height)),
+            colour: loaded.colour,
             exposure: loaded.exposure,
             exposure_from: loaded.exposure_from.clone(),
             choice: wanted.choice.clone(),
@@ -424,6 +444,8 @@ pub struct Side {
     pub lit_by: Option<String>,
     /// Warnings of the plan.
     pub warnings: Arc<[String]>,
+    /// Why it is not drawn as it is asked for, or not to its end; `None` where it is.
+    pub refused: Option<String>,
 }
 
 /// Difference between both sides.
@@ -519,7 +541,15 @@ impl SharedState {
     /// Starts with a request.
     #[must_use]
     pub fn new(wanted: RenderRequest) -> Self {
-        Self { wanted: Mutex::new((wanted, 1)), changed: Condvar::new(), seen: Mutex::default() }
+        let shared = Self::waiting(wanted);
+        shared.want(|_| {});
+        shared
+    }
+
+    /// Holds a request; the render thread waits until it is changed.
+    #[must_use]
+    pub fn waiting(wanted: RenderRequest) -> Self {
+        Self { wanted: Mutex::new((wanted, 0)), changed: Condvar::new(), seen: Mutex::default() }
     }
 
     /// Changes the request and wakes the render thread.
@@ -539,5 +569,25 @@ impl SharedState {
     /// Clears the last error.
     pub fn dismiss(&self) {
         lock(&self.seen).error = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etalon::plan::Model;
+
+    use super::*;
+
+    #[test]
+    fn a_side_is_asked_for_by_its_own_knobs() {
+        let alone = RenderRequest::new(Settings::default());
+        let both = RenderRequest { other: Some(Knobs::exact()), ..alone.clone() };
+        assert!(!both.is_same_view(&alone));
+        assert!(both.of_side(0).is_same_view(&alone), "the left side is drawn already");
+        assert!(!both.of_side(1).is_same_view(&alone));
+        let mut turned = both.clone();
+        turned.settings.knobs = Knobs::of(Model::Local);
+        assert!(turned.of_side(1).is_same_view(&both.of_side(1)), "the right side is drawn already");
+        assert!(!turned.of_side(0).is_same_view(&both.of_side(0)));
     }
 }

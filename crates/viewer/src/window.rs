@@ -114,6 +114,8 @@ pub(crate) struct OpenWindow {
     proxy: EventLoopProxy<Woken>,
     /// Scene file of the command line.
     first: Option<PathBuf>,
+    /// Animation time of the command line in seconds; `None` is the rest pose.
+    time: Option<f64>,
     /// When the scene file is read again.
     reads_at: Option<Instant>,
     /// Number of a scene that is read again; its camera stays.
@@ -139,8 +141,21 @@ pub(crate) struct OpenWindow {
 
 impl OpenWindow {
     pub(crate) fn new(events: &ActiveEventLoop, start: Start, proxy: EventLoopProxy<Woken>) -> Result<Self> {
-        let Start { size, id, icon, settings, device: which, validate, panels, choice, source, command, said, file } =
-            start;
+        let Start {
+            size,
+            id,
+            icon,
+            settings,
+            device: which,
+            validate,
+            panels,
+            choice,
+            source,
+            command,
+            said,
+            file,
+            time,
+        } = start;
         let preferences = Preferences::load();
         let window = Arc::new(
             events.create_window(attributes(events, size, &preferences, id, icon)).context("opening a window")?,
@@ -149,7 +164,6 @@ impl OpenWindow {
         let recent = preferences::recent();
         let mut state = PanelState::new(settings.clone(), choice.clone(), device.info().clone(), recent, preferences);
         state.panels = panels;
-        let wanted = RenderRequest { choice: choice.clone(), ..RenderRequest::new(settings) };
         let context = egui::Context::default();
         // Zoom and theme are those of the preferences.
         context.options_mut(|options| options.zoom_with_keyboard = false);
@@ -157,8 +171,10 @@ impl OpenWindow {
         let side = device.max_image_size() as usize;
         let egui =
             egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, native, window.theme(), Some(side));
-        let (code, sent) = (wanted.code.clone(), Some(wanted.clone()));
-        let shared = Arc::new(SharedState::new(wanted));
+        let wanted = RenderRequest::new(settings);
+        let code = wanted.code.clone();
+        // The first frame finds the size of the picture, which a camera that frames the scene depends on.
+        let shared = Arc::new(SharedState::waiting(wanted));
         let worker = {
             let (device, shared) = (device.clone(), shared.clone());
             let proxy = proxy.clone();
@@ -188,7 +204,7 @@ impl OpenWindow {
             scene: 0,
             navigated: None,
             moment: None,
-            sent,
+            sent: None,
             moving_until: None,
             drawn: Instant::now() - FRAME,
             dirty: true,
@@ -202,6 +218,7 @@ impl OpenWindow {
             written: Arc::default(),
             proxy,
             first: file,
+            time,
             reads_at: None,
             again: None,
             saves: Vec::new(),
@@ -333,6 +350,11 @@ impl OpenWindow {
             self.state.preferences.size = Some([size.width, size.height]);
         }
         self.state.preferences.save();
+        for save in &self.saves {
+            tracing::warn!("{} is not written: the window was closed", save.path.display());
+        }
+        // The render thread reads a scene to its end before it ends.
+        self.window.set_visible(false);
         self.shared.want(|wanted| {
             wanted.quit = true;
             self.device.interrupt();
@@ -436,7 +458,9 @@ impl OpenWindow {
                 }
                 _ => {
                     self.state.navigation = Some(Navigation::new(facts.home.clone(), facts.bounds, facts.framed));
-                    self.state.settings.knobs = facts.knobs.clone().unwrap_or(self.state.settings.knobs.clone());
+                    if let Some(colour) = facts.colour {
+                        self.state.settings.knobs.colour = colour;
+                    }
                     self.state.settings.exposure = facts.exposure;
                     facts.exposure_from.iter().for_each(|why| self.state.notices.say(why.clone()));
                 }
@@ -446,6 +470,7 @@ impl OpenWindow {
             } else {
                 self.state.begin_scene();
             }
+            self.state.clock.rest = self.time.filter(|_| self.file().is_none());
             self.remember();
             self.watch();
             self.window.set_title(&format!("{} – Etalon", facts.name));
@@ -472,10 +497,12 @@ impl OpenWindow {
             && self.small != Some(scene)
         {
             self.small = Some(scene);
-            if let Some(path) = self.scene_file()
-                && let Err(error) = preferences::keep_small(&path, &shown.opaque, shown.size)
-            {
-                tracing::info!("the small picture of {} cannot be written: {error:#}", path.display());
+            if let Some(path) = self.scene_file() {
+                if let Err(error) = preferences::keep_small(&path, &shown.opaque, shown.size) {
+                    tracing::info!("the small picture of {} cannot be written: {error:#}", path.display());
+                }
+                // The menu reads it again.
+                self.state.small.remove(&std::path::absolute(&path).unwrap_or(path));
             }
         }
     }
@@ -483,13 +510,20 @@ impl OpenWindow {
     /// Writes the pictures that were asked for once they are drawn. A picture that is soon finished is saved then,
     /// others as they are; radiance is that of all samples.
     fn save(&mut self, seen: &RenderState) {
-        let Some(sent) = self.sent.clone() else { return };
+        let Some(sent) = self.sent.clone().filter(|_| !self.saves.is_empty()) else { return };
         let display = |request: &RenderRequest| (request.settings.tonemap, request.settings.exposure);
         let is_same = |of: &RenderRequest| of.is_same_view(&sent) && display(of) == display(&sent);
-        let answers = |shown: &shared::Shown| !shown.moving && shown.of.as_ref().is_some_and(is_same);
         let sides = &seen.sides[..1 + usize::from(sent.other.is_some())];
-        let drawn: Vec<_> =
-            sides.iter().filter_map(|side| side.shown.as_ref()).filter(|shown| answers(shown)).collect();
+        let answers = |index: usize, shown: &shared::Shown| {
+            // A finished side is not drawn again when the knobs of the other one change.
+            let is_this = |of: &RenderRequest| {
+                of.of_side(index).is_same_view(&sent.of_side(index)) && display(of) == display(&sent)
+            };
+            !shown.moving && shown.of.as_ref().is_some_and(is_this)
+        };
+        let shown = sides.iter().enumerate().filter_map(|(index, side)| Some((index, side.shown.as_ref()?)));
+        let drawn: Vec<_> = shown.filter(|(index, shown)| answers(*index, shown)).map(|(_, shown)| shown).collect();
+        let refused = sides.iter().find_map(|side| side.refused.as_ref()).filter(|_| seen.busy.is_none());
         let are_drawn = drawn.len() == sides.len();
         for mut save in std::mem::take(&mut self.saves) {
             let name = save.path.display().to_string();
@@ -512,8 +546,8 @@ impl OpenWindow {
                 continue;
             }
             // What cannot be drawn is not awaited.
-            if let Some(error) = seen.error.as_ref().filter(|_| !are_drawn && seen.busy.is_none()) {
-                self.state.notices.fail(format!("{name} is not written: {error}"));
+            if let Some(cause) = refused {
+                self.state.notices.fail(format!("{name} is not written: {cause}"));
                 continue;
             }
             if !std::mem::replace(&mut save.is_told, true) {
@@ -536,7 +570,12 @@ impl OpenWindow {
                 // A picture of one time is saved.
                 self.state.clock.playing = false;
                 let (layer, wipe) = (self.state.layer, self.state.wipe);
-                self.saves.push(PendingSave { path, layer, wipe, of: None, is_told: false });
+                if let Some(path) = saved_as(&path) {
+                    self.saves.push(PendingSave { path, layer, wipe, of: None, is_told: false });
+                } else {
+                    let name = path.display();
+                    self.state.notices.fail(format!("{name} is not written: only .png and .exr are written"));
+                }
             }
             Action::CopyPicture => match self.picture(seen) {
                 Some(picture) => {
@@ -550,10 +589,8 @@ impl OpenWindow {
             },
             Action::CopyCommand => {
                 let Some(command) = self.words() else {
-                    self.state.notices.fail(
-                        "no command draws this view: --eye and --target cannot describe an orthographic camera or a view straight up or down"
-                            .to_owned(),
-                    );
+                    let text = "no command draws this view: --eye and --target cannot describe an orthographic camera";
+                    self.state.notices.fail(text.to_owned());
                     return;
                 };
                 self.egui.egui_ctx().copy_text(command.clone());
@@ -659,7 +696,7 @@ impl OpenWindow {
             surfaces: self.state.wants_surfaces() || self.saves.iter().any(PendingSave::is_exr),
             triangles: self.state.layer.reads_triangles(),
             meter: self.state.meter,
-            picked: self.state.picked,
+            picked: self.state.picked.clone(),
             code: self.code.clone(),
             quit: false,
         };
@@ -757,6 +794,12 @@ impl OpenWindow {
     }
 }
 
+/// The file that a picture is saved as: PNG without an ending; `None` for the ending of another format.
+fn saved_as(path: &Path) -> Option<PathBuf> {
+    let Some(ending) = path.extension() else { return Some(path.with_extension("png")) };
+    ["png", "exr"].iter().any(|known| ending.eq_ignore_ascii_case(known)).then(|| path.to_owned())
+}
+
 /// Title, size and name of the window: the size that is asked for, or that of the last run, if the screen has room.
 fn attributes(
     events: &ActiveEventLoop,
@@ -779,4 +822,17 @@ fn attributes(
         .with_window_icon(Icon::from_rgba(rgba, side, side).ok())
         .with_inner_size(PhysicalSize::new(width, height))
         .with_min_inner_size(PhysicalSize::new(160, 120))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_have_the_format_of_their_ending() {
+        let saved = |name: &str| saved_as(Path::new(name)).map(|path| path.display().to_string());
+        assert_eq!(saved("a folder.d/a"), Some("a folder.d/a.png".to_owned()));
+        assert_eq!(["a.PNG", "b.exr"].map(saved), ["a.PNG", "b.exr"].map(|name| Some(name.to_owned())));
+        assert_eq!(["a.jpg", "b.png.txt"].map(saved), [None, None]);
+    }
 }

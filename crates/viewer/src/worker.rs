@@ -156,7 +156,9 @@ impl Worker {
                 worker.stage.iter_mut().flat_map(|stage| &mut stage.sides).for_each(|side| side.drawing = None);
                 let lost = is_lost(&error);
                 worker.say(|seen| {
-                    seen.error = Some(format!("{error:#}"));
+                    let cause = format!("{error:#}");
+                    seen.sides.iter_mut().for_each(|side| side.refused = Some(cause.clone()));
+                    seen.error = Some(cause);
                     seen.lost |= lost;
                 });
                 if lost {
@@ -214,6 +216,10 @@ impl Worker {
             if !same_view || side.drawing.as_ref().is_none_or(|drawing| drawing.of() != samples) {
                 side.drawing = Some(side.renderer.begin(camera, samples));
                 side.spent = Duration::ZERO;
+                // Where what is asked for cannot be drawn, this draws the rungs of before.
+                if stage.refused[index].is_none() {
+                    lock(&self.shared.seen).sides[index].refused = None;
+                }
             } else if !same_display && side.drawing.as_ref().is_some_and(Drawing::is_whole) {
                 developed.push(index);
             }
@@ -289,6 +295,7 @@ impl Worker {
         let Some(stage) = &mut self.stage else { return Ok(()) };
         if wanted.other.is_none() {
             stage.sides.truncate(1);
+            stage.refused[1] = None;
             let is_seen = lock(&self.shared.seen).sides[1].shown.is_some();
             if is_seen {
                 self.say(|seen| (seen.sides[1], seen.difference) = Default::default());
@@ -301,7 +308,7 @@ impl Worker {
             let refused =
                 stage.refused[index].as_ref().is_some_and(|r| r.size == settings.size && same_renderer(r, &settings));
             if ready && stage.refused[index].take().is_some() {
-                self.say(|seen| seen.error = None);
+                self.say(|seen| (seen.error, seen.sides[index].refused) = (None, None));
             } else if !ready && (!refused || renewed) {
                 self.plan(wanted, settings, index)?;
             }
@@ -311,7 +318,9 @@ impl Worker {
 
     /// Plans and uploads one side with other knobs.
     fn plan(&mut self, wanted: &RenderRequest, settings: Settings, index: usize) -> Result<()> {
-        self.say(|seen| seen.busy = Some("uploading and compiling".to_owned()));
+        self.say(|seen| {
+            (seen.busy, seen.sides[index].refused) = (Some("uploading and compiling".to_owned()), None);
+        });
         let Some(stage) = &mut self.stage else { return Ok(()) };
         let made = DrawnSide::new(&self.device, &stage.loaded, wanted, index);
         match made {
@@ -332,7 +341,10 @@ impl Worker {
             // The sides that can be drawn go on.
             Err(error) => {
                 stage.refused[index] = Some(settings);
-                self.say(|seen| (seen.busy, seen.error) = (None, Some(format!("{error:#}"))));
+                self.say(|seen| {
+                    let cause = format!("{error:#}");
+                    (seen.busy, seen.sides[index].refused, seen.error) = (None, Some(cause.clone()), Some(cause));
+                });
                 Ok(())
             }
         }
@@ -532,30 +544,26 @@ impl Worker {
         Ok(())
     }
 
-    /// Traces the ray of the inspected pixel from the camera of the inspection; the user may have moved since.
+    /// Traces the ray of the inspected pixel from the camera of the click; the user may have moved since.
     fn trace(&mut self, wanted: &RenderRequest, last: Option<&RenderRequest>) -> Result<()> {
-        let Some(picked) = wanted.picked else {
+        let Some(picked) = &wanted.picked else {
             let known = lock(&self.shared.seen).trace.is_some();
             if known {
                 self.say(|seen| seen.trace = None);
             }
             return Ok(());
         };
-        let known = lock(&self.shared.seen).trace.clone().filter(|trace| trace.number == picked.number);
+        let is_known = lock(&self.shared.seen).trace.as_ref().is_some_and(|trace| trace.number == picked.number);
         let same = |last: &RenderRequest| last.settings.knobs == wanted.settings.knobs && last.time == wanted.time;
-        if known.is_some() && last.is_some_and(same) {
+        if is_known && last.is_some_and(same) {
             return Ok(());
         }
         let Some(stage) = &mut self.stage else { return Ok(()) };
-        let (seen_from, size) = match known {
-            Some(known) => (known.seen_from.clone(), known.size),
-            None => (wanted.from.camera(&stage.loaded)?.clone(), wanted.settings.size),
-        };
+        let Pick { number, pixel, size, seen_from } = picked.clone();
         let tracer = stage.tracer()?;
         let limits = limits_of(&wanted.settings.knobs);
-        let events = tracer.follow(stage.loaded.original.scene(), &seen_from, size, picked.pixel, &limits);
+        let events = tracer.follow(stage.loaded.original.scene(), &seen_from, size, pixel, &limits);
         stage.tracer = Some(tracer);
-        let Pick { number, pixel } = picked;
         self.say(|seen| seen.trace = Some(Arc::new(Trace { number, pixel, events, seen_from, size })));
         Ok(())
     }

@@ -81,6 +81,7 @@ fn seen(loaded: &Loaded) -> RenderState {
         effects: plan.expect("a plan").effects.into(),
         warnings: Arc::new([]),
         lit_by: Some("lit by the light \"lamp\" and the built-in studio at intensity 0.5 as fill light".to_owned()),
+        refused: None,
     };
     RenderState { facts: Some(Arc::new(facts)), sides: [side, Side::default()], ..RenderState::default() }
 }
@@ -106,7 +107,7 @@ impl Window {
         let preferences = Preferences { docks: Some(Docks::new(size[0] / scale)), ..Preferences::default() };
         let mut state = PanelState::new(Settings::default(), FileChoice::default(), device, Vec::new(), preferences);
         let bounds = seen.facts.as_ref().expect("facts").bounds;
-        state.navigation = Some(Navigation::new(loaded.camera.clone(), bounds, false));
+        state.navigation = Some(Navigation::new(loaded.camera.clone(), bounds, None));
         let context = Context::default();
         context.set_theme(theme);
         Self { context, state, size: Vec2::from(size) / scale, scale, time: 0.0 }
@@ -246,6 +247,72 @@ fn nothing_is_cut_off_and_nothing_overlaps() {
         wrong.len(),
         wrong.iter().take(60).cloned().collect::<Vec<_>>().join("\n")
     );
+}
+
+/// The figures of both sides of a comparison stand beside each other.
+#[test]
+fn figures_of_both_sides_do_not_overlap() {
+    let loaded = loaded();
+    let mut seen = seen(&loaded);
+    seen.sides[1] = seen.sides[0].clone();
+    seen.sides[1].shown.as_mut().expect("a picture").knobs = Knobs::exact();
+    for (size, scale) in SIZES {
+        let mut window = Window::new(size, scale, egui::ThemePreference::Dark, &loaded, &seen);
+        window.state.other = Some(Knobs::exact());
+        (0..4).for_each(|_| drop(window.frame(&seen, Vec::new())));
+        let output = window.frame(&seen, Vec::new());
+        let figures = output.shapes.iter().filter_map(|clipped| match &clipped.shape {
+            Shape::Text(text) if text.galley.text().contains(" samples\n") => {
+                Some(text.galley.rect.translate(text.pos.to_vec2()))
+            }
+            _ => None,
+        });
+        let figures: Vec<Rect> = figures.collect();
+        assert!(figures.len() == 2 && !figures[0].intersects(figures[1]), "{size:?} ×{scale}: {figures:?}");
+    }
+}
+
+/// A slow frame receives several presses at once: each counts, and a held key counts once.
+#[test]
+fn presses_in_one_frame_count() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let key =
+        |pressed| Event::Key { key: Key::G, physical_key: None, pressed, repeat: false, modifiers: Modifiers::NONE };
+    let (held, twice) = (vec![key(true), key(true)], vec![key(true), key(false), key(true), key(false)]);
+    for (presses, events) in [(1, held), (2, twice)] {
+        let mut window = Window::new([1280.0, 720.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+        drop(window.frame(&seen, Vec::new()));
+        let before = window.state.preferences.overlays.grid;
+        drop(window.frame(&seen, events));
+        let changed = window.state.preferences.overlays.grid != before;
+        assert_eq!(changed, presses == 1, "{presses} presses");
+    }
+}
+
+/// A picture fills its area, but for a view that was framed for a wider one.
+#[test]
+fn a_framed_view_is_not_cut_off_in_a_narrower_window() {
+    let loaded = loaded();
+    let seen = seen(&loaded);
+    let mut window = Window::new([1280.0, 720.0], 1.0, egui::ThemePreference::Dark, &loaded, &seen);
+    window.state.panels = false;
+    let aspect = |window: &Window| {
+        let [left, top, right, bottom] = window.state.place;
+        f64::from(right - left) / f64::from(bottom - top)
+    };
+    let press =
+        |key: Key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::NONE };
+    drop(window.frame(&seen, Vec::new()));
+    window.size = Vec2::new(800.0, 720.0);
+    drop(window.frame(&seen, Vec::new()));
+    assert!((aspect(&window) - 16.0 / 9.0).abs() < 0.01, "a camera of the file: {:?}", window.state.place);
+    drop(window.frame(&seen, vec![press(Key::F)]));
+    drop(window.frame(&seen, Vec::new()));
+    assert!((aspect(&window) - 800.0 / 720.0).abs() < 0.01, "framed for all of the window: {:?}", window.state.place);
+    window.size = Vec2::new(400.0, 720.0);
+    drop(window.frame(&seen, Vec::new()));
+    assert!((aspect(&window) - 800.0 / 720.0).abs() < 0.01, "the sides stay: {:?}", window.state.place);
 }
 
 #[test]

@@ -124,7 +124,7 @@ fn animation(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
         if ui.button(name).on_hover_text("Play or pause (Space)").clicked() {
             state.clock.toggle(duration);
         }
-        let mut seconds = state.clock.time.unwrap_or_default();
+        let mut seconds = state.clock.seconds();
         let slider = Slider::new(&mut seconds, 0.0..=duration).suffix(" s").max_decimals(3).clamping(UNTOUCHED);
         if ui.add(slider).changed() {
             state.clock.set(seconds, duration);

@@ -164,6 +164,8 @@ fn progress(ui: &mut Ui, seen: &RenderState) {
         // The whole picture follows when the view rests.
         (true, _) => "preview".to_owned(),
         (_, true) => format!("{of} sample{}, done", if of == 1 { "" } else { "s" }),
+        // It may have ended before its last sample.
+        _ if seen.sides[0].refused.is_some() => format!("{done}/{of} samples"),
         _ => format!("{done}/{of} samples, {} left", duration(shown.seconds_left)),
     };
     ui.label(what).on_hover_text(format!(

@@ -138,6 +138,8 @@ pub struct PanelState {
     pub moved: bool,
     /// Left, top, right and bottom of the picture in pixels of the window.
     pub place: [i32; 4],
+    /// Width and height in pixels of the area that the picture may fill.
+    room: [u32; 2],
     /// Recently opened files, the latest first.
     pub recent: Vec<PathBuf>,
     /// Device that draws.
@@ -178,7 +180,7 @@ pub struct PanelState {
     metered: u64,
     undoer: Undoer<Undoable>,
     /// Small pictures of recent files.
-    small: HashMap<PathBuf, Option<TextureHandle>>,
+    pub(crate) small: HashMap<PathBuf, Option<TextureHandle>>,
     /// Time of the user interface in seconds when the animation last advanced.
     played_at: f64,
 }
@@ -195,6 +197,7 @@ impl PanelState {
     ) -> Self {
         Self {
             navigation: None,
+            room: settings.size,
             settings,
             other: None,
             side: 0,
@@ -317,8 +320,9 @@ impl PanelState {
         *self.dialog.state() == DialogState::Open
     }
 
+    /// Aspect ratio of a picture that fills its area.
     fn aspect(&self) -> f64 {
-        f64::from(self.settings.size[0]) / f64::from(self.settings.size[1].max(1))
+        f64::from(self.room[0]) / f64::from(self.room[1].max(1))
     }
 
     /// Places of the panels; the default for a window of this width in points at the first call.
@@ -532,14 +536,15 @@ fn keys(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, actions: &mut V
             continue;
         }
         // Each press counts: a slow frame may receive several at once. A held key repeats only where that helps.
-        let held = ui.input(|input| {
-                let again = |event: &egui::Event| {
-                    matches!(event, egui::Event::Key { key, repeat: true, .. } if *key == shortcut.logical_key)
-                };
-                input.events.iter().any(again)
+        let mut count = 0;
+        ui.input_mut(|input| {
+            input.events.retain(|event| {
+                let egui::Event::Key { key, pressed: true, repeat, modifiers, .. } = event else { return true };
+                let is_other = *key != shortcut.logical_key || !modifiers.matches_logically(shortcut.modifiers);
+                count += usize::from(!is_other && (entry.repeats || !repeat));
+                is_other
             });
-        let count = ui.input_mut(|input| input.count_and_consume_key(shortcut.modifiers, shortcut.logical_key));
-        let count = if entry.repeats { count } else { count.min(usize::from(!held)) };
+        });
         (0..count).for_each(|_| perform(ui, state, seen, entry.command, actions));
     }
     let numbers = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
@@ -634,7 +639,7 @@ fn perform(ui: &Ui, state: &mut PanelState, seen: &RenderState, command: MenuCom
         MenuCommand::Forward | MenuCommand::Back => {
             let Some(duration) = duration else { return };
             state.clock.playing = false;
-            let at = (state.clock.time.unwrap_or_default() / FILM_STEP).round();
+            let at = (state.clock.seconds() / FILM_STEP).round();
             let step = if command == MenuCommand::Forward { 1.0 } else { -1.0 };
             state.clock.set((at + step) * FILM_STEP, duration);
         }

@@ -39,6 +39,7 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
         // An option that the user changed stays in sight.
         let is_changed = unneeded.iter().any(|(index, _)| state.knob == Some(*index));
         egui::CollapsingHeader::new(format!("{} options change nothing here", unneeded.len()))
+            .id_salt("unneeded options")
             .open(is_changed.then_some(true))
             .show(ui, |ui| grid(ui, "unneeded", &unneeded, state, seen, &reason));
     }

@@ -147,7 +147,12 @@ fn measured(canvas: &Canvas<'_>, points: &[DVec3]) {
 
 /// Text on a dark ground.
 pub(super) fn text(painter: &Painter, at: Pos2, align: Align2, text: &str) {
-    let galley = painter.layout_no_wrap(text.to_owned(), FontId::monospace(12.0), Color32::WHITE);
+    wrapped(painter, at, align, text, f32::INFINITY);
+}
+
+/// Text on a dark ground, in lines of at most `width` points.
+pub(super) fn wrapped(painter: &Painter, at: Pos2, align: Align2, text: &str, width: f32) {
+    let galley = painter.layout(text.to_owned(), FontId::monospace(12.0), Color32::WHITE, width);
     let rect = align.anchor_size(at, galley.size());
     painter.rect_filled(rect.expand(4.0), 3.0, Color32::from_black_alpha(190));
     painter.galley(rect.min, galley, Color32::WHITE);

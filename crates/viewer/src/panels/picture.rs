@@ -4,7 +4,7 @@
 use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Ui};
 use glam::{DVec2, DVec3};
 
-use super::overlay::{self, AXES, Canvas, text};
+use super::overlay::{self, AXES, Canvas, text, wrapped};
 use super::pixel::{colour, incidence};
 use super::{Action, Click, Clicked, PanelState};
 use crate::layer::SurfaceLayer;
@@ -35,7 +35,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, acti
     let scale = ui.ctx().pixels_per_point();
     let corner = |p: Pos2| [(p.x * scale).round() as i32, (p.y * scale).round() as i32];
     let ([left, top], [right, bottom]) = (corner(area.min), corner(area.max));
-    let least_aspect = state.navigation.as_ref().and_then(Navigation::least_aspect);
+    let least_aspect = state.navigation.as_ref().map(Navigation::least_aspect);
+    state.room = [right - left, bottom - top].map(|side| side.max(1) as u32);
     state.place = fitted([left, top, right, bottom], least_aspect);
     let [left, top, right, bottom] = state.place;
     let rect = Rect::from_min_max(
@@ -164,7 +165,8 @@ fn clicks(ui: &Ui, response: &egui::Response, under: Option<[u32; 2]>, state: &m
     let clicked = |click| Some(Clicked { click, pixel, size: state.settings.size, seen_from: navigation.camera() });
     if response.clicked() && ui.input(|input| input.modifiers.command) {
         state.picks += 1;
-        state.picked = Some(Pick { number: state.picks, pixel });
+        let (size, seen_from) = (state.settings.size, navigation.camera());
+        state.picked = Some(Pick { number: state.picks, pixel, size, seen_from });
         (state.pixel, state.forward) = (None, Some(Pane::Pixel));
     } else if response.double_clicked() && !state.measures {
         state.clicked = clicked(Click::Focus);
@@ -283,11 +285,13 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut PanelState, seen: &RenderState) {
             0 => (rect.left_bottom() + egui::vec2(8.0, -8.0), Align2::LEFT_BOTTOM),
             _ => (rect.right_bottom() + egui::vec2(-8.0, -8.0), Align2::RIGHT_BOTTOM),
         };
-        text(&painter, at, align, &words);
+        // Each label stays in its half of the picture.
+        wrapped(&painter, at, align, &words, (0.5 * rect.width() - 20.0).max(40.0));
     }
 }
 
-/// Label of one side: knobs that differ from the other side, time, samples and error.
+/// Label of one side: knobs that differ from the other side, time, samples and error. `cost` measures one picture; that
+/// of the window may differ from it by view, time and light.
 fn account(side: usize, seen: &RenderState) -> Option<String> {
     let shown = seen.sides[side].shown.as_ref()?;
     let other = seen.sides[1 - side].shown.as_ref().map_or(&shown.knobs, |other| &other.knobs);
@@ -311,7 +315,8 @@ fn account(side: usize, seen: &RenderState) -> Option<String> {
         };
         table.points.iter().find(is_this)
     });
-    lines.extend(known.map(|point| format!("error {:.2} %, measured by etalon cost", 100.0 * point.error())));
+    let error = known.map(|point| 100.0 * point.error());
+    lines.extend(error.map(|error| format!("error {error:.2} % in the picture that etalon cost measured")));
     if side == 1 {
         lines.push(match seen.difference() {
             Some(difference) => format!("FLIP {:.4} between the two sides", difference.flip),

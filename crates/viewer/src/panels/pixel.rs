@@ -47,12 +47,12 @@ fn look(state: &mut PanelState, trace: &Trace, seen: &RenderState) -> bool {
 }
 
 pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
-    let Some(picked) = state.picked else {
+    let Some(number) = state.picked.as_ref().map(|picked| picked.number) else {
         ui.weak("Ctrl+click a pixel to inspect it.");
         return;
     };
-    let trace = seen.trace.as_ref().filter(|trace| trace.number == picked.number);
-    scroll_here(ui, (picked.number, trace.is_some()));
+    let trace = seen.trace.as_ref().filter(|trace| trace.number == number);
+    scroll_here(ui, (number, trace.is_some()));
     let (Some(trace), Some(scene)) = (trace, &seen.facts) else {
         ui.weak("available when the picture is finished");
         return;

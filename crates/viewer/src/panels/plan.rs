@@ -22,7 +22,8 @@ pub(super) fn show(ui: &mut Ui, state: &mut PanelState, seen: &RenderState) {
     }
     let unneeded = of(|state| *state == EffectState::NotCalledFor).count();
     if unneeded > 0 {
-        ui.collapsing(format!("{unneeded} effects are not needed"), |ui| {
+        let header = egui::CollapsingHeader::new(format!("{unneeded} effects are not needed")).id_salt("not needed");
+        header.show(ui, |ui| {
             for effect in of(|state| *state == EffectState::NotCalledFor) {
                 ui.label(effect.id.to_string());
                 ui.weak(effect.reason());

@@ -174,7 +174,8 @@ fn lists(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, facts: &SceneF
             row("size, m", format!("{:.3} {:.3} {:.3}", size.x, size.y, size.z));
         });
     });
-    ui.collapsing(format!("Materials ({})", facts.materials.len()), |ui| {
+    let list = |name: &str, count: usize| egui::CollapsingHeader::new(format!("{name} ({count})")).id_salt(name);
+    list("Materials", facts.materials.len()).show(ui, |ui| {
         for (index, material) in facts.materials.iter().enumerate().take(MOST_ROWS) {
             let name = if material.name.is_empty() { format!("material {index}") } else { material.name.clone() };
             egui::CollapsingHeader::new(name).id_salt(("material", index)).show(ui, |ui| {
@@ -189,20 +190,20 @@ fn lists(ui: &mut Ui, state: &mut PanelState, seen: &RenderState, facts: &SceneF
             });
         }
     });
-    ui.collapsing(format!("Textures ({})", facts.images.len()), |ui| {
+    list("Textures", facts.images.len()).show(ui, |ui| {
         for (index, (name, [width, height])) in facts.images.iter().enumerate().take(MOST_ROWS) {
             let name = if name.is_empty() { format!("image {index}") } else { name.clone() };
             ui.add(egui::Label::new(format!("{name}, {width}×{height}")).truncate());
         }
     });
-    ui.collapsing(format!("Lights ({lights})"), |ui| {
+    list("Lights", lights).show(ui, |ui| {
         for light in facts.lights.iter().take(MOST_ROWS) {
             let [r, g, b] = light.color;
             let unit = if matches!(light.kind, etalon::scene::LightKind::Directional { .. }) { "lx" } else { "cd" };
             ui.add(egui::Label::new(format!("{}: {r:.3} {g:.3} {b:.3} {unit}", light.name)).truncate());
         }
     });
-    ui.collapsing(format!("Cameras ({})", facts.cameras.len()), |ui| {
+    list("Cameras", facts.cameras.len()).show(ui, |ui| {
         for (index, camera) in facts.cameras.iter().enumerate().take(MOST_ROWS) {
             if ui.add(egui::Button::new(&camera.name).truncate()).clicked() {
                 go_to(state, seen, index);
