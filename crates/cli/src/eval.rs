@@ -12,7 +12,7 @@ use super::setup::validated;
 use super::{print, usage};
 use etalon::gpu::Device;
 use etalon::optics::{Case, Tier, ulp};
-use etalon_verify::{Cases, Entry, arguments, evaluate, find};
+use etalon_verify::{Cases, Entry, absolute_error, arguments, evaluate, find};
 
 /// Evaluate one shader function at one point: three tiers on the device, the f64 twin, the error in ulps, the bound
 #[derive(Debug, Clone, Args)]
@@ -44,6 +44,11 @@ impl EvalArgs {
         arguments::all_used(&values, &used, &[entry])?;
         Ok((entry, row))
     }
+}
+
+/// Whether an error is beyond its bound; one that is no number is. Outside its domain an equation has no bound: NaN.
+fn is_beyond(error: f64, allowed: f64) -> bool {
+    !allowed.is_nan() && (error.is_nan() || error > allowed)
 }
 
 /// Runs the command.
@@ -91,8 +96,8 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
         let exact = cases.exact[i];
         let shown = |(tier, values): &(Tier, Vec<f32>)| {
             let value = values[i];
-            let error = (f64::from(value) - exact).abs();
-            let broken = *tier != Tier::Fast && exact.is_finite() && error > allowed(*tier, i);
+            let error = absolute_error(value, exact);
+            let broken = *tier != Tier::Fast && exact.is_finite() && is_beyond(error, allowed(*tier, i));
             let ulps = match error / ulp(exact) {
                 ulps if !exact.is_finite() || !ulps.is_finite() => String::new(),
                 ulps if ulps >= 1e4 => format!(" ({ulps:.0e} ulp)"),
@@ -108,4 +113,17 @@ pub fn run(args: &EvalArgs) -> Result<ExitCode> {
     }
     print(&table.to_string())?;
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_number_is_beyond_every_bound() {
+        assert!(is_beyond(f64::NAN, f64::INFINITY) && is_beyond(2.0, 1.0) && is_beyond(f64::INFINITY, 1.0));
+        assert!(!is_beyond(1.0, 1.0) && !is_beyond(f64::NAN, f64::NAN));
+        // A result that underflows is no error, as in `verify`.
+        assert!(!is_beyond(absolute_error(0.0, 1e-40), 1e-45) && is_beyond(absolute_error(0.0, 1e-30), 1e-45));
+    }
 }

@@ -59,7 +59,8 @@ pub fn run(args: &PassportArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
         account(&passport, whole)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let device = Device::open(&args.device.choice(), args.device.validate)?;
+    let choice = args.device.choice();
+    let device = Device::open(&choice, args.device.validate)?;
     let mut scope = Scope::of(&device);
     if !args.only.is_empty() {
         scope.sections = args.only.clone();
@@ -68,7 +69,7 @@ pub fn run(args: &PassportArgs, quiet: bool, whole: bool) -> Result<ExitCode> {
         scope.scenes = args.scene.iter().map(|name| format!("study:{name}")).collect();
     }
     let steps = Steps::new(args.progress, quiet);
-    let passport = measure(&device, &scope, &mut |step| steps.step(step, 1))?;
+    let passport = measure(&device, &choice, &scope, &mut |step| steps.step(step, 1))?;
     drop(steps);
     file::write(&args.output, passport.to_json()?.as_bytes())?;
     account(&passport, whole)?;

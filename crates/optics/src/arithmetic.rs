@@ -253,7 +253,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "lo",
-                bound: "as hi",
+                bound: "1.5 ulp of hi + 2^-45 Σ|a b|",
                 allowed: |c| {
                     let terms: f64 = (0..3).map(|k| (c.inputs[k] * c.inputs[k + 3]).abs()).sum();
                     1.5 * ulp(c.exact[0]) + 2_f64.powi(-45) * terms

@@ -467,7 +467,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
                 bound: "half of sum2's + 2 ulp",
                 allowed: |c| c.ulps(2.0) + c.rel(0.5 * lv2_part(c, c.exact[3])),
             },
-            Output { name: "sum2", bound: "5 ulp; compensated 4 ulp", allowed: lv2_allowed },
+            Output { name: "sum2", bound: LV2_BOUND, allowed: lv2_allowed },
         ],
         axis: Axis { name: "|L + V|", log: true, of: |x| phong_vectors(x).3.sqrt(), column: 3, relative: true },
         extreme: 1e4,
@@ -649,10 +649,10 @@ pub(super) const EQUATIONS: &[Equation] = &[
         twin: |x| reciprocal_phong(vector(x, 0), vector(x, 3), vector(x, 6), [x[9], x[10], x[11], x[12]]).to_vec(),
         regions: PHONG,
         outputs: &[
-            Output { name: "LV2", bound: "5 ulp; compensated 4 ulp", allowed: lv2_allowed },
+            Output { name: "LV2", bound: LV2_BOUND, allowed: lv2_allowed },
             Output {
                 name: "fr_spec",
-                bound: "k_s/(L + V)² times blinn_phong's spec + 6 ulp",
+                bound: "k_s/(L + V)² times blinn_phong's spec + the part of LV2 + 2 ulp",
                 allowed: |c| {
                     let s2 = c.exact[0].max(f64::MIN_POSITIVE);
                     let lobe = c.inputs[11] * lobe_allowed(c) / s2;
@@ -815,7 +815,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "fr_cos",
-                bound: "those of its factors + 30 ulp",
+                bound: "twice those of its factors + 30 ulp",
                 allowed: |c| c.ulps(30.0) + c.rel(2.0 * factors(c)),
             },
         ],
@@ -940,6 +940,8 @@ pub(super) const EQUATIONS: &[Equation] = &[
         extreme: 1e38,
     },
 ];
+
+const LV2_BOUND: &str = "5 ulp + 4.8e-7 |L + V| times the difference of |L| and |V|; compensated 4 ulp";
 
 /// Relative error of (L + V)². Stable: two rounded lengths (1.7 ulp), their sum twice, and its square; when only the
 /// lengths differ, removing that difference leaves 2^-24 of it.

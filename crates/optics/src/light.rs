@@ -260,7 +260,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[Output {
             name: "falloff",
-            bound: "2 ulp + 2.4e-7/r² of the window's end",
+            bound: "2.5 ulp + 2.4e-7/r² of the window's end",
             allowed: |c| {
                 let x = c.inputs[0] * c.inputs[1];
                 let window = if x > 0.0 && x < 1.01 { 2.4e-7 * x * x } else { 0.0 };
@@ -320,7 +320,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         ],
         outputs: &[Output {
             name: "one_minus_cos",
-            bound: "4 ulp + the rounding of q² over 2 cosθ, at most its root",
+            bound: "4 ulp + 0.6 of the rounding of q² over cosθ, at most 1.2 of its root",
             allowed: |c| {
                 let sin2 = (c.inputs[0] / c.inputs[1]).min(1.0);
                 let error = 2_f64.powi(-24) * sin2;
@@ -373,7 +373,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             Output { name: "lz", bound: "as lx", allowed: |_| 3e-7 },
             Output {
                 name: "share",
-                bound: "8 ulp + 2.4e-7/r² of the window's end + (scale 3e-7 + 1.2e-7 scale)/r² of the ramp, twice",
+                bound: "8 ulp + (2.4e-7 of the window's end + 1e-6 scale of the ramp + (5e-7 scale)²)/r²",
                 allowed: |c| {
                     if c.inputs[3] != 0.0 {
                         return 0.0;
@@ -402,7 +402,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         }],
         outputs: &[Output {
             name: "t",
-            bound: "2e-7 d + half of 4e-7 r² over the root, at most the root of that",
+            bound: "2.4e-7 d + half of 4e-7 r² over the root + 2e-7 of it, the root of 4e-7 r² where the root is less",
             allowed: |c| {
                 let d = c.inputs[0].sqrt();
                 let disc = (c.inputs[1].powi(2) - c.inputs[0] * c.inputs[3]).max(0.0);

@@ -316,7 +316,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
             },
             Output {
                 name: "t0",
-                bound: "5 ulp + δ/2√(r² − l²); stable near the surface 8·2^-24 (f² + r²)/|f² − r²|",
+                bound: "5 ulp + δ/√D, √(3δ) where D = r² − l² ≤ 2δ; stable near the surface 2^-21 (f² + r²)/|f² − r²|",
                 allowed: root_allowed,
             },
             Output { name: "t1", bound: "as t0", allowed: root_allowed },
@@ -455,7 +455,7 @@ pub(super) const EQUATIONS: &[Equation] = &[
         outputs: &[
             Output {
                 name: "qx",
-                bound: "1 ulp + 1.2e-7 of the offset",
+                bound: "1 ulp + 2.4e-7 of the offset",
                 allowed: |c| c.ulps(1.0) + 2.4e-7 * c.inputs[9],
             },
             Output { name: "qy", bound: "as qx", allowed: |c| c.ulps(1.0) + 2.4e-7 * c.inputs[9] },

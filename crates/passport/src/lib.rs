@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
-use etalon::gpu::{Capabilities, Device, DeviceInfo};
+use etalon::gpu::{Capabilities, Device, DeviceChoice, DeviceInfo};
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
@@ -68,7 +68,7 @@ pub struct Scope {
     pub bytes: u64,
     /// Size of the pictures whose rays are timed.
     pub rays_at: [u32; 2],
-    /// Milliseconds up to which dispatches are tried.
+    /// Milliseconds of a dispatch after which no longer one is tried.
     pub dispatch_ms: f64,
 }
 
@@ -166,12 +166,18 @@ pub struct Passport {
     pub seconds: f64,
 }
 
-/// Measures a device; `progress` is called with the name of each step. A section that fails is left out, and the
-/// failure is a broken promise; sections after a lost device are left out as well.
+/// Measures the device that `choice` opened, and opens it once more; `progress` is called with the name of each step. A
+/// section that fails is left out, and the failure is a broken promise; sections after a lost device are left out as
+/// well.
 ///
 /// # Errors
 /// When nothing can be measured.
-pub fn measure(device: &Arc<Device>, scope: &Scope, progress: &mut dyn FnMut(&str)) -> Result<Passport> {
+pub fn measure(
+    device: &Arc<Device>,
+    choice: &DeviceChoice,
+    scope: &Scope,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Passport> {
     let begun = Instant::now();
     let DeviceInfo { name, driver, version, kind, api } = device.info().clone();
     let system = format!("{} {}", std::env::consts::OS, std::env::consts::ARCH);
@@ -204,11 +210,13 @@ pub fn measure(device: &Arc<Device>, scope: &Scope, progress: &mut dyn FnMut(&st
                 equations::measure(device, scope.cases, progress).map(|found| passport.equations = Some(found))
             }
             Section::Pictures => {
-                let found = pictures::measure(device, &scenes, scope.size, progress);
+                let found = pictures::measure(device, choice, &scenes, scope.size, progress);
                 found.map(|found| passport.pictures = Some(found))
             }
             Section::Speed => {
-                let found = speed::measure(device, scope.bytes, scenes[0], scope.rays_at, scope.dispatch_ms);
+                let first = scenes.first().context("timing rays: no scene was asked for");
+                let Scope { bytes, rays_at, dispatch_ms, .. } = *scope;
+                let found = first.and_then(|scene| speed::measure(device, bytes, scene, rays_at, dispatch_ms));
                 found.map(|found| passport.speed = Some(found))
             }
         };
@@ -235,6 +243,7 @@ impl Passport {
     pub fn read(text: &str) -> Result<Self> {
         let mut passport: Self = serde_json::from_str(text).context("reading a passport")?;
         ensure!(passport.schema == SCHEMA, "reading a passport: its schema is {:?}, not {SCHEMA:?}", passport.schema);
+        passport.agrees()?;
         let (failed, own): (Vec<_>, Vec<_>) =
             std::mem::take(&mut passport.promises).into_iter().partition(|promise| promise.promise.starts_with(FAILS));
         let found = passport.found();
@@ -249,8 +258,56 @@ impl Passport {
             );
         }
         ensure!(own.len() == found.len(), "reading a passport: it has verdicts without a measurement");
+        for (i, Promise { promise, held, .. }) in failed.iter().enumerate() {
+            let name = &promise[FAILS.len()..];
+            let is_missing = |section: Section| name == <&str>::from(section) && !passport.has(section);
+            let once = failed[..i].iter().all(|other| other.promise != *promise);
+            ensure!(
+                !held && once && Section::VARIANTS.iter().copied().any(is_missing),
+                "reading a passport: \"{promise}\" is no broken promise of a part that is missing, or is there twice"
+            );
+        }
         passport.promises = [found, failed].concat();
         Ok(passport)
+    }
+
+    /// Whether a section was measured.
+    fn has(&self, section: Section) -> bool {
+        match section {
+            Section::Arithmetic => self.arithmetic.is_some(),
+            Section::Equations => self.equations.is_some(),
+            Section::Pictures => self.pictures.is_some(),
+            Section::Speed => self.speed.is_some(),
+        }
+    }
+
+    /// Checks that no section is empty, and that what it says of a figure is what the figure says.
+    fn agrees(&self) -> Result<()> {
+        let arithmetic = self.arithmetic.as_ref().is_none_or(|found| !found.builtins.is_empty());
+        let equations = self.equations.as_ref().is_none_or(|found| !found.is_empty());
+        let pictures = self.pictures.as_ref().is_none_or(|found| {
+            // What was not drawn was refused.
+            !found.refused.is_empty() || !(found.scenes.is_empty() || found.ways.is_empty())
+        });
+        ensure!(arithmetic && equations && pictures, "reading a passport: a list of measurements is empty");
+        for of in self.equations.iter().flatten() {
+            // The ratio has four digits: what is just above 1 is 1.
+            let agrees = if of.held { of.of_bound <= 1.0 } else { of.of_bound >= 1.0 };
+            let (function, tier, ratio) = (&of.function, &of.tier, of.of_bound);
+            ensure!(
+                agrees,
+                "reading a passport: an error of {function} ({tier}) is {ratio} of its bound; the file says otherwise"
+            );
+        }
+        for way in self.pictures.iter().flat_map(|pictures| &pictures.ways) {
+            ensure!(
+                !way.same || way.largest == 0.0,
+                "reading a passport: the picture {} differs by {:.1e}; the file says otherwise",
+                way.way,
+                way.largest
+            );
+        }
+        Ok(())
     }
 
     /// What holds of what Etalon relies on, by the measurements.
@@ -269,7 +326,7 @@ impl Passport {
             promise("precise products are rounded", percent == 0.0, format!("{percent:.1} % are not"));
             let special = arithmetic.knows_nan && arithmetic.knows_infinity;
             promise("NaN and infinity are kept", special, format!("min(NaN, 1) is {}", arithmetic.min_of_nan));
-            let rounds = matches!(arithmetic.half_rounds.as_str(), "nearest" | "down");
+            let rounds = matches!(arithmetic.half_rounds.as_str(), "nearest" | "down" | "up");
             promise("halves are a neighbour", rounds, format!("they round {}", arithmetic.half_rounds));
         }
         if let Some(equations) = &self.equations {
@@ -286,7 +343,7 @@ impl Passport {
             let all = count + pictures.refused.len();
             promise("study scenes are drawn", pictures.refused.is_empty(), format!("{count} of {all}"));
             let not_finite: u64 = pictures.scenes.iter().map(|scene| scene.not_finite).sum();
-            promise("radiance is finite", not_finite == 0, format!("{not_finite} pixels are not"));
+            promise("radiance is finite", not_finite == 0, format!("{not_finite} pixels or paths are not"));
             for way in &pictures.ways {
                 let figure = format!("largest difference {:.1e}", way.largest);
                 promise(&format!("the same bits {}", way.way), way.same, figure);

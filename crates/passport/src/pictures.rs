@@ -31,7 +31,7 @@ pub struct DrawnScene {
     pub hash: String,
     /// Mean radiance of each of 8 times 4 parts of the picture, row by row, with four digits.
     pub small: Vec<[f32; 3]>,
-    /// Pixels that are NaN or infinite.
+    /// Pixels that are NaN or infinite, and what paths brought that was and was dropped.
     pub not_finite: u64,
     /// Milliseconds of the first picture, with compilation.
     pub first_ms: f64,
@@ -129,7 +129,8 @@ fn drawn(device: &Arc<Device>, scene: &str, model: Model, size: [u32; 2]) -> Res
         model: model.name().to_owned(),
         hash: hash(&film),
         small: small(&film),
-        not_finite: u64::from(rendered.counts.nan) + u64::from(rendered.counts.inf),
+        // Shaders drop what is not finite from paths before it reaches a pixel.
+        not_finite: u64::from(rendered.counts.nan) + u64::from(rendered.counts.inf) + rendered.work.not_finite,
         first_ms,
         second_ms,
         passes,
@@ -137,7 +138,7 @@ fn drawn(device: &Arc<Device>, scene: &str, model: Model, size: [u32; 2]) -> Res
 }
 
 /// Draws a picture by paths in other ways.
-fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePicture>> {
+fn ways(device: &Arc<Device>, choice: &DeviceChoice, scene: &str, size: [u32; 2]) -> Result<Vec<SamePicture>> {
     let usual = settings(Model::Global, size)?;
     let reference = shot(device, scene, usual.clone())?.film;
     let brightest = reference.rgba.iter().flat_map(|p| &p[..3]).fold(0.0_f32, |most, x| most.max(*x));
@@ -157,18 +158,19 @@ fn ways(device: &Arc<Device>, scene: &str, size: [u32; 2]) -> Result<Vec<SamePic
         let other = Settings { traversal: Some(traversal), ..usual.clone() };
         found.push(beside(&format!("traversal {traversal:?}"), &shot(device, scene, other)?.film));
     }
-    let choice = DeviceChoice::Name(device.info().name.clone());
-    let sliced = Device::open_time_sliced(&choice, false)?;
+    let sliced = Device::open_time_sliced(choice, false)?;
     found.push(beside("in short submissions", &shot(&sliced, scene, usual)?.film));
     Ok(found)
 }
 
-/// Draws scenes in all models at a size; `progress` is called with the name of each picture.
+/// Draws scenes in all models at a size, on the device that `choice` opened; `progress` is called with the name of each
+/// picture.
 ///
 /// # Errors
 /// When no picture can be drawn.
 pub fn measure(
     device: &Arc<Device>,
+    choice: &DeviceChoice,
     scenes: &[&str],
     size: [u32; 2],
     progress: &mut dyn FnMut(&str),
@@ -187,7 +189,7 @@ pub fn measure(
     }
     let first = scenes.first().context("drawing pictures: no scene was asked for")?;
     progress("one picture in several ways");
-    match ways(device, first, size) {
+    match ways(device, choice, first, size) {
         Ok(ways) => pictures.ways = ways,
         Err(error) if etalon::gpu::is_lost(&error) => return Err(error),
         Err(error) => pictures.refused.push(format!("{first} in several ways: {error:#}")),

@@ -1,7 +1,7 @@
 //! A passport of the device here, and what is read of one that was mailed.
 
 use etalon_passport::{Passport, SCHEMA, Scope, Section, measure};
-use etalon_testing::gpu::Gpu;
+use etalon_testing::gpu::{Gpu, choice};
 
 fn small() -> Scope {
     Scope {
@@ -19,7 +19,8 @@ fn small() -> Scope {
 fn the_device_here_keeps_what_etalon_relies_on() {
     let gpu = Gpu::open();
     let mut told = Vec::new();
-    let passport = measure(&gpu.device, &small(), &mut |step| told.push(step.to_owned())).expect("a passport");
+    let mut tell = |step: &str| told.push(step.to_owned());
+    let passport = measure(&gpu.device, &choice(), &small(), &mut tell).expect("a passport");
     let broken: Vec<_> = passport.promises.iter().filter(|promise| !promise.held).collect();
     assert!(broken.is_empty() && passport.promises.len() > 20, "{broken:?}");
     assert!(told.iter().any(|step| step == "study:cornell, global"), "{told:?}");
@@ -49,7 +50,7 @@ fn the_device_here_keeps_what_etalon_relies_on() {
 fn only_what_is_asked_for_is_measured() {
     let gpu = Gpu::open();
     let scope = Scope { sections: vec![Section::Arithmetic], ..small() };
-    let passport = measure(&gpu.device, &scope, &mut |_| ()).expect("a passport");
+    let passport = measure(&gpu.device, &choice(), &scope, &mut |_| ()).expect("a passport");
     assert!(passport.arithmetic.is_some() && passport.equations.is_none());
     assert!(passport.pictures.is_none() && passport.speed.is_none());
 }
@@ -98,8 +99,38 @@ fn what_was_changed_is_refused() {
     );
     // An error that is smaller than its verdict says.
     refused(&|value| value["arithmetic"]["builtins"][0]["of_allowed"] = 7.0.into(), "is broken, 7.000");
+    // Figures that are not what is said of them, and parts without figures.
+    refused(&|value| value["equations"][0]["of_bound"] = 50.0.into(), "is 50 of its bound");
+    refused(&|value| value["equations"][0]["held"] = false.into(), "of its bound; the file says otherwise");
+    refused(&|value| value["pictures"]["ways"][0]["largest"] = 0.5.into(), "differs by 5.0e-1");
+    for [part, list] in [["arithmetic", "builtins"], ["pictures", "scenes"], ["pictures", "ways"]] {
+        refused(&|value| value[part][list] = serde_json::json!([]), "a list of measurements is empty");
+    }
+    refused(&|value| value["equations"] = serde_json::json!([]), "a list of measurements is empty");
     refused(&|value| value["schema"] = "etalon.passport/9".into(), SCHEMA);
     refused(&|value| value["more"] = 1.into(), "unknown field");
     refused(&|value| value["capabilities"]["limits"] = "many".into(), "invalid type");
     assert!(Passport::read("{").is_err() && Passport::read("").is_err());
+}
+
+#[test]
+fn only_what_is_missing_cannot_be_measured() {
+    let (_, text) = mailed().into_iter().find(|(name, _)| name.contains("swiftshader")).expect("SwiftShader's");
+    // A file without speeds, and what it says instead of them.
+    let read = |said: &[(&str, bool)]| {
+        let mut value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        value["speed"] = serde_json::Value::Null;
+        let promises = value["promises"].as_array_mut().expect("a list");
+        promises.retain(|promise| promise["promise"] != "long dispatches end");
+        let promise = |&(part, held): &(&str, bool)| serde_json::json!({ "promise": format!("can be measured: {part}"), "held": held, "figure": "" });
+        promises.extend(said.iter().map(promise));
+        Passport::read(&value.to_string())
+    };
+    assert!(read(&[]).is_ok() && read(&[("speed", false)]).is_ok());
+    let refused: [&[(&str, bool)]; 4] =
+        [&[("speed", true)], &[("pictures", false)], &[("luck", false)], &[("speed", false), ("speed", false)]];
+    for said in refused {
+        let error = read(said).expect_err("a promise of nothing");
+        assert!(format!("{error:#}").contains("no broken promise of a part that is missing"), "{said:?}: {error:#}");
+    }
 }

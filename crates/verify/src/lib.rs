@@ -251,7 +251,8 @@ pub struct Worst {
 
 /// Absolute error of `got`. It is 0 where the exact value underflows the normal numbers of f32 and `got` is zero or
 /// denormal, which Vulkan allows, and where the exact value overflows and `got` is infinite or the largest number.
-fn absolute_error(got: f32, exact: f64) -> f64 {
+#[must_use]
+pub fn absolute_error(got: f32, exact: f64) -> f64 {
     let value = f64::from(got);
     if exact.abs() >= f64::from(f32::MAX) && value.abs() >= f64::from(f32::MAX) && value.signum() == exact.signum() {
         return 0.0;
