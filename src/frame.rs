@@ -261,6 +261,11 @@ impl Renderer {
     ) -> Result<Rendered> {
         while !drawing.is_done() {
             if drawing.is_whole() && is_stopped() {
+                let samples = drawing.samples();
+                let is_known = drawing.errors.last().is_some_and(|error| error.samples == samples);
+                if self.halves() == 2 && samples > 1 && !is_known {
+                    drawing.errors.push(self.error(samples, drawing.count)?);
+                }
                 return self.picture(&drawing);
             }
             let known = drawing.errors.len();

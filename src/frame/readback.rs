@@ -94,7 +94,8 @@ impl Renderer {
     /// Error estimate from the two halves after `samples` samples.
     pub(super) fn error(&self, samples: u32, count: u32) -> Result<SampleError> {
         let [a, b] = self.half_sums(samples, count)?;
-        Ok(error_of_halves([&a.rgba, &b.rgba], samples))
+        let (of_sums, _) = self.samples_of_sums(samples, count);
+        Ok(error_of_halves([&a.rgba, &b.rgba], [of_sums[0], of_sums[1]]))
     }
 
     /// The means of the two halves of the last picture's samples, over the background colour; `None` when there is one

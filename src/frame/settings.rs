@@ -4,8 +4,8 @@ use anyhow::Result;
 
 use super::{Part, TileShare};
 use crate::gpu::Device;
-use crate::image::Picture;
 use crate::image::tone::{ToneMap, ViewTransform};
+use crate::image::{MAX_PIXELS, Picture};
 use crate::plan::rungs::{Indirect, Reflection, Refraction};
 use crate::plan::{Architecture, ForcedEffects, Knobs, Refused, Setting};
 use crate::prepare::Conditions;
@@ -27,6 +27,11 @@ pub(super) fn check_size(device: &Device, knobs: &Knobs, size: [u32; 2]) -> Resu
     if pixels * bytes > device.max_storage_bytes() {
         let most = device.max_storage_bytes() / bytes;
         let why = format!("{}x{}: this device holds at most {most} pixels in one picture", size[0], size[1]);
+        return Err(Refused::error(Setting::Size, why));
+    }
+    // No larger file can be read again.
+    if pixels > MAX_PIXELS {
+        let why = format!("{}x{}: a picture has at most {MAX_PIXELS} pixels", size[0], size[1]);
         return Err(Refused::error(Setting::Size, why));
     }
     Ok(())

@@ -155,10 +155,13 @@ pub fn run(args: &DiffArgs, whole: bool) -> Result<ExitCode> {
     };
     print(&line)?;
     if let Some(max) = args.max
-        && !args.metric.within(found.value, max)
+        && !pass
     {
         let side = if args.metric.grows_with_likeness() { "below" } else { "above" };
-        note(&format!("{b} differs from {a}: {name} {} is {side} {max}", short(found.value)));
+        note(&match args.metric.within(found.value, max) {
+            true => format!("comparing {b} with {a} fails: pixels with NaN or infinity fail every limit"),
+            false => format!("{b} differs from {a}: {name} {} is {side} {max}", short(found.value)),
+        });
     }
     Ok(if pass { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

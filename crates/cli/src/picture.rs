@@ -150,6 +150,22 @@ impl RenderArgs {
         }
         Ok(settings)
     }
+
+    /// Files that the command line names to be read.
+    fn inputs(&self) -> impl Iterator<Item = &Path> {
+        let SceneOptions { scene, env, .. } = &self.scene;
+        let scene = Some(scene).filter(|scene| *scene != "-" && !scene.starts_with("study:"));
+        let env = env.as_ref().filter(|env| !["studio", "none"].contains(&env.as_str()));
+        scene.into_iter().chain(env).map(Path::new)
+    }
+
+    /// Refuses a file that an option writes and that the command reads.
+    ///
+    /// # Errors
+    /// When the file is the scene or the environment.
+    pub(super) fn spares_inputs(&self, option: &str, path: &Path) -> Result<()> {
+        self.inputs().try_for_each(|input| differs(option, path, input))
+    }
 }
 
 /// Layers of `--aov`.
@@ -247,8 +263,12 @@ pub(super) fn check_same_scene(path: &Path, scene: &str) -> Result<()> {
 /// Whether two paths name one file.
 pub(super) fn are_same(a: &Path, b: &Path) -> bool {
     let whole = |path: &Path| {
+        if let Ok(whole) = std::fs::canonicalize(path) {
+            return Some(whole);
+        }
+        // A file that does not exist yet has a folder.
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some((std::fs::canonicalize(folder).ok()?, path.file_name()?.to_owned()))
+        Some(std::fs::canonicalize(folder).ok()?.join(path.file_name()?))
     };
     a == b || whole(a).zip(whole(b)).is_some_and(|(a, b)| a == b)
 }
@@ -465,4 +485,20 @@ fn layer(pixels: &[AovPixel], view: &View, name: AovName) -> Aov {
         }
     };
     Aov { name: title.to_owned(), channels: channels.iter().map(|c| (*c).to_owned()).collect(), samples }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_is_the_file_it_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link, other] = ["file.glb", "link.png", "other.png"].map(|name| folder.path().join(name));
+        std::fs::write(&file, b"").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        assert!(are_same(&file, &link) && !are_same(&file, &other));
+        let name = folder.path().file_name().unwrap();
+        assert!(are_same(&other, &folder.path().join("..").join(name).join("other.png")));
+    }
 }

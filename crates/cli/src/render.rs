@@ -294,12 +294,12 @@ fn outputs(args: &RenderArgs) -> Result<Vec<(PathBuf, Format)>> {
         return usage(Err(anyhow!("--aov: layers are written to an EXR; add -o FILE.exr")));
     }
     let files = || all.iter().map(|(path, _)| path).filter(|path| !is_standard(path));
-    let environment = args.scene.env.as_ref().map(PathBuf::from);
     let check = || -> Result<()> {
-        files()
-            .chain(&args.report)
-            .try_for_each(|path| environment.iter().try_for_each(|env| differs("--env", env, path)))?;
-        args.report.iter().try_for_each(|report| files().try_for_each(|path| differs("--report", report, path)))
+        files().try_for_each(|path| args.spares_inputs("--output", path))?;
+        args.report.iter().try_for_each(|report| {
+            args.spares_inputs("--report", report)?;
+            files().try_for_each(|path| differs("--report", report, path))
+        })
     };
     usage(check())?;
     files().chain(&args.report).try_for_each(|path| file::check_writable(path))?;

@@ -150,9 +150,14 @@ fn check_writable(args: &RenderArgs, request: &SequenceRequest) -> Result<()> {
     if args.sequence.cameras.is_empty() {
         check_pictures(args, request, &[""])?;
     }
-    if let (Some(report), Some(preview)) = (&args.report, &request.preview) {
-        usage(differs("--report", report, preview))?;
-    }
+    let check = || -> Result<()> {
+        request.preview.iter().try_for_each(|preview| args.spares_inputs("--output", preview))?;
+        args.report.iter().try_for_each(|report| {
+            args.spares_inputs("--report", report)?;
+            request.preview.iter().try_for_each(|preview| differs("--report", report, preview))
+        })
+    };
+    usage(check())?;
     request.preview.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))
 }
 
@@ -164,6 +169,7 @@ fn check_pictures(args: &RenderArgs, request: &SequenceRequest, cameras: &[&str]
             cameras.iter().flat_map(|camera| request.frames.iter().map(move |frame| (camera, frame)))
         {
             let path = pattern.path(frame, camera);
+            usage(args.spares_inputs("--output", &path))?;
             usage(args.report.iter().try_for_each(|report| differs("--report", report, &path)))?;
             if args.output.is_empty() {
                 check_same_scene(&path, &args.scene.scene)?;
@@ -332,9 +338,7 @@ pub fn run(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> R
     }
     let mut preview = None;
     if let Some(path) = wanted.preview.as_ref().filter(|_| !shown.is_empty()) {
-        // APNG stores the delay as a fraction of 16-bit numbers: milliseconds over 1000.
-        let of_second = (1000.0 / wanted.fps).round().clamp(1.0, f64::from(u16::MAX)) as u16;
-        let bytes = png::encode_animation(&shown, [of_second, 1000])?;
+        let bytes = png::encode_animation(&shown, delay(wanted.fps))?;
         file::write(path, &bytes)?;
         preview = Some(WrittenFile { path: path.display().to_string(), hash: file::hash(&bytes) });
     }
@@ -354,6 +358,20 @@ pub fn run(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> R
         bail!("validation: {}", message.text);
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Numerator and denominator of the seconds for which an animated PNG shows a picture.
+fn delay(fps: f64) -> [u16; 2] {
+    // Rates such as 29.97 have three decimals. The format stores two numbers of 16 bits.
+    let most = f64::from(u16::MAX);
+    let of = (1000.0 * fps).round();
+    if of < 1.0 {
+        [u16::MAX, 1]
+    } else if of <= most {
+        [1000, of as u16]
+    } else {
+        [1, fps.round().min(most) as u16]
+    }
 }
 
 /// Prints the path of a written file unless `printed` has it. Returns whether it was printed.
@@ -454,5 +472,23 @@ impl Drawer<'_> {
         let [width, height] = self.settings.size;
         let display = Display { width, height, rgba: rendered.display.as_chunks::<4>().0.to_vec() };
         Ok((told, files.iter().any(|(_, format)| *format == Format::Png).then_some(display)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preview_has_the_rate_of_its_frames() {
+        for (fps, fraction) in [
+            (24.0, [1000, 24_000]),
+            (29.97, [1000, 29_970]),
+            (120.0, [1, 120]),
+            (1e9, [1, u16::MAX]),
+            (1e-4, [u16::MAX, 1]),
+        ] {
+            assert_eq!(delay(fps), fraction, "{fps}");
+        }
     }
 }

@@ -56,6 +56,7 @@ pub(super) fn only_output<'a>(args: &'a RenderArgs, [index, of]: [u32; 2], setti
         bail!("--shard {index}/{of}: name the one file of this part with -o, for example -o {index}.part")
     };
     ensure!(!is_standard(output), "--output -: a part is continued from its file; name one");
+    args.spares_inputs("--output", output)?;
     check_layers(&args.aov, settings)?;
     ensure!(
         settings.max_error.is_none(),

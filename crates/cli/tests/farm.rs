@@ -45,15 +45,15 @@ fn moving(folder: &Path) {
 fn same_in_parts(picture: &str, split: &str, of: u32) {
     let folder = folder();
     let at = folder.path();
-    run(at, &format!("render {picture} --size 45x27 -o one.exr -o one.png")).succeeded();
+    run(at, &format!("render {picture} --size 45x27 --validate -o one.exr -o one.png")).succeeded();
     let mut parts = String::new();
     // The last one first, and not in the order of their names.
     for index in (1..=of).rev() {
-        run(at, &format!("render {picture} --size 45x27 --shard {index}/{of} --split {split} -o {index}.part"))
-            .succeeded();
+        let shard = format!("--shard {index}/{of} --split {split} -o {index}.part");
+        run(at, &format!("render {picture} --size 45x27 --validate {shard}")).succeeded();
         parts = if index % 2 == 0 { format!("{parts} {index}.part") } else { format!("{index}.part {parts}") };
     }
-    run(at, &format!("merge {parts} -o all.exr -o all.png --report all.json")).succeeded();
+    run(at, &format!("merge {parts} --validate -o all.exr -o all.png --report all.json")).succeeded();
     for format in ["exr", "png"] {
         let [one, all] = ["one", "all"].map(|name| bytes(at.join(name).with_extension(format)));
         assert!(one == all, "{picture} in {of} by {split}: another {format}");
@@ -188,7 +188,10 @@ fn what_cannot_be_divided_is_refused() {
         // Files that the command reads or writes already.
         ("--report cornell.png", 2, "--report cornell.png"),
         ("--turntable 3 -o a.{frame}.png --report a.1.png", 2, "--report a.1.png"),
-        ("--env a.exr -o a.exr", 2, "--env a.exr"),
+        ("--env a.exr -o a.exr", 2, "--output a.exr"),
+        ("--env a.exr --shard 1/2 -o a.exr", 2, "--output a.exr"),
+        ("--env 1.exr --turntable 3 -o {frame}.exr", 2, "--output 1.exr"),
+        ("--env a.exr --turntable 3 --report a.exr", 2, "--report a.exr"),
     ] {
         // 8 tiles.
         run(at, &format!("render study:cornell --size 32x16 {arguments}")).failed(code, said);
@@ -282,7 +285,8 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
     run(at, &format!("{picture} -o one.exr")).succeeded();
     let line = format!("{picture} --shard 1/1 -o 1.part --progress openjd");
     let mut ended = None;
-    for _ in 0..40 {
+    let mut kept = Vec::new();
+    for attempt in 0..40 {
         let mut child = Command::new(env!("CARGO_BIN_EXE_etalon"))
             .args(line.split(' '))
             .current_dir(at)
@@ -291,7 +295,8 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
             .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        std::thread::sleep(Duration::from_millis(1500));
+        // A busy machine needs longer until there is something to keep.
+        std::thread::sleep(Duration::from_millis(1500 + 100 * attempt));
         Command::new("sh").args(["-c", &format!("kill -TERM {}", child.id())]).status().expect("a shell");
         let told = Instant::now();
         let status = child.wait().expect("it ends");
@@ -300,7 +305,9 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
         match ended {
             Some(143) => {
                 if at.join("1.part").exists() {
-                    run(at, "merge 1.part -o all.exr").failed(1, "is incomplete");
+                    let said = run(at, "merge 1.part -o all.exr").failed(1, "is incomplete").stderr;
+                    let samples = said.split_once("it has ").and_then(|(_, rest)| rest.split_once(" of "));
+                    kept.push(samples.and_then(|(count, _)| count.parse::<u32>().ok()).expect("a number of samples"));
                 }
             }
             Some(0) => break,
@@ -310,6 +317,8 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
     if ended != Some(0) {
         run(at, &line).succeeded();
     }
+    assert!(!kept.is_empty() && kept.is_sorted(), "samples that were kept: {kept:?}");
+    assert!(kept.len() == 1 || kept.last() > kept.first(), "no part went on: {kept:?}");
     run(at, "merge 1.part -o all.exr").succeeded();
     assert!(bytes(at.join("one.exr")) == bytes(at.join("all.exr")), "a part that went on is another picture");
     // And once more, by somebody else: nothing is drawn, nothing is changed.

@@ -101,6 +101,19 @@ fn non_finite_pixels_are_counted_and_left_out() {
 }
 
 #[test]
+fn what_is_left_out_has_no_error_of_its_neighbours() {
+    let mut a = Picture::filled(11, 11, [0.2, 0.2, 0.2, 1.0]);
+    a.rgba[60][0] = f32::NAN;
+    let (a, b) = (AnyPicture::Linear(a), linear(11, 11, 0.6));
+    let found = compare(Metric::Flip, &a, &b).unwrap();
+    assert!(found.map[60] == 0.0 && found.map[59] > 0.0, "{:?}", &found.map[59..61]);
+    near(found.value, found.map.iter().map(|&error| f64::from(error)).sum::<f64>() / 120.0);
+    // Pixel 60 is the middle of the only window.
+    let error = compare(Metric::Ssim, &a, &b).unwrap_err().to_string();
+    assert_eq!(error, "the pixel in the middle of every window of ssim is NaN or infinite");
+}
+
+#[test]
 fn pictures_that_cannot_be_compared() {
     let error = compare(Metric::Mse, &grey(2, 3, 0), &grey(3, 2, 0)).unwrap_err().to_string();
     assert_eq!(error, "the pictures have different sizes, 2x3 and 3x2");

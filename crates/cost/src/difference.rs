@@ -4,7 +4,7 @@
 //! The estimates use pairs of half buffers with independent random numbers; docs/cost.md, "Error", derives them.
 //! Metrics: FLIP (Andersson et al. 2020), CIEDE2000, and the relative mean squared error.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use palette::color_difference::Ciede2000;
 use palette::{IntoColor, Lab, Srgb};
 use rayon::prelude::*;
@@ -63,12 +63,12 @@ impl Truth {
         let mut sorted = flip.map.clone();
         sorted.sort_by(f32::total_cmp);
         let p95 = sorted.get(sorted.len() * 95 / 100).copied().unwrap_or_default();
-        let n = film.rgba.len() as f64;
-        let (mut raw, mut own, mut spread, mut squares) = (0.0, 0.0, 0.0, 0.0);
+        let (mut n, mut raw, mut own, mut spread, mut squares) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for ((x, r), half) in film.rgba.iter().zip(&self.film.rgba).zip(&self.half.rgba) {
             if [x, r, half].iter().any(|pixel| pixel.iter().any(|value| !value.is_finite())) {
                 continue;
             }
+            n += 1.0;
             let (d, e) = (minus(*x, *r), minus(*half, *r));
             let (d2, e2) = (relative(d, d, *r), relative(e, e, *r));
             raw += d2;
@@ -76,6 +76,7 @@ impl Truth {
             spread += 4.0 * d2 * e2;
             squares += d[..3].iter().map(|d| f64::from(*d).powi(2)).sum::<f64>();
         }
+        ensure!(n > 0.0, "no pixel is finite in both the picture and the reference");
         let deviation = spread.sqrt() / n;
         let errors = Errors {
             error: self.shown.error_interval(display),
@@ -398,6 +399,18 @@ mod tests {
         let right = picture(|_| 0.5);
         let (errors, _) = truth.errors(&right, &shown(&right)).unwrap();
         assert!(errors.relmse.median.abs() < 3e-4, "{errors:?}");
+    }
+
+    #[test]
+    fn pixels_that_are_not_finite_dilute_no_error() {
+        let film = picture(|_| 0.5);
+        let exact = ShownReference::exact(&shown(&film));
+        let truth = Truth { shown: exact, display: shown(&film), half: film.clone(), film };
+        let off = |i: usize| if i.is_multiple_of(4) { f32::NAN } else { 0.75 };
+        let (errors, _) = truth.errors(&picture(off), &shown(&picture(|_| 0.75))).unwrap();
+        assert!((errors.rmse - 0.25).abs() < 1e-12, "{errors:?}");
+        let nothing = picture(|_| f32::NAN);
+        assert!(truth.errors(&nothing, &shown(&nothing)).is_err());
     }
 
     fn flat(byte: u8) -> Display {

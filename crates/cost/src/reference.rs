@@ -257,7 +257,9 @@ impl Pilot {
         let plain_ms = more * plain.each_ms;
         let rungs = |colour: &str| set(&Knobs::exact(), "colour", colour);
         let Some(seen) = seen else {
-            let why = if by_wavelength && !has_time {
+            let why = if !by_wavelength {
+                "the scene has colours and no spectra".to_owned()
+            } else if !has_time {
                 "the budget has no time for spectral rendering, although the scene has spectra".to_owned()
             } else if off_in_rgb > 0.0 {
                 format!(
@@ -421,8 +423,7 @@ impl Refined {
         bench: &Bench<'_>,
     ) -> Result<(Reference, Vec<u8>)> {
         let halves = [0, 1].map(|odd| half(&self.parts, odd));
-        let sum = |half: &Picture| -> Vec<[f32; 4]> { half.rgba.iter().map(|p| p.map(|v| 0.5 * v)).collect() };
-        let own = error_of_halves([&sum(&halves[0]), &sum(&halves[1])], 1);
+        let own = error_of_halves([&halves[0].rgba, &halves[1].rgba], [1, 1]);
         let any = |display: Display| AnyPicture::Display(display);
         let view = bench.settings.view_transform();
         let half = display_of(&truth.half, &view);
@@ -432,7 +433,7 @@ impl Refined {
             Some(png) => png.clone(),
             None => {
                 let Display { width, height, rgba } = &truth.display;
-                png::encode_png(*width, *height, rgba.as_flattened(), false)?
+                png::encode_png(*width, *height, rgba.as_flattened(), view.background.is_none())?
             }
         };
         let samples = set(&self.knobs, "samples", &self.rounds[0].samples.to_string())?;
@@ -512,13 +513,14 @@ impl Refined {
     }
 }
 
-/// Display values of a film.
+/// Display values of a film; without a background their alpha is the coverage.
 pub(super) fn display_of(film: &Picture, view: &ViewTransform) -> Display {
-    let pixel = |v: [f32; 3]| {
+    let pixel = |(v, [.., coverage]): ([f32; 3], &[f32; 4])| {
         let [r, g, b] = v.map(|v| tone::quantise(f64::from(v)));
-        [r, g, b, 255]
+        let alpha = if view.background.is_some() { 255 } else { tone::quantise(f64::from(*coverage)) };
+        [r, g, b, alpha]
     };
-    let rgba = shown(film, view).into_iter().map(pixel).collect();
+    let rgba = shown(film, view).into_iter().zip(&film.rgba).map(pixel).collect();
     Display { width: film.width, height: film.height, rgba }
 }
 
@@ -551,6 +553,15 @@ pub fn refine(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_transparent_stays_transparent() {
+        let film = Picture { width: 2, height: 1, rgba: vec![[0.0; 4], [1.0; 4]] };
+        let clear = ViewTransform { curve: tone::ToneMap::Linear, exposure: 0.0, background: None };
+        assert_eq!(display_of(&film, &clear).rgba, [[0, 0, 0, 0], [255, 255, 255, 255]]);
+        let white = ViewTransform { background: Some([1.0; 3]), ..clear };
+        assert_eq!(display_of(&film, &white).rgba, [[255; 4]; 2]);
+    }
 
     /// A picture whose colours differ by 1 % of the range between RGB and bands, and bands are twelve times as dear:
     /// they pay where there is time for so many samples that noise is less than that.

@@ -136,8 +136,9 @@ fn whole(mut parts: Vec<Part>) -> Joined {
         channels: ["R", "G", "B"].map(str::to_owned).into(),
         samples: AovData::F32(sum.rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b].map(|value| value * mean)).collect()),
     }));
-    let both = (halves == 2).then(|| [0, 1].map(|half| scale(&sums[half], 2.0 / samples as f32)));
-    let error = (halves == 2).then(|| error_of_halves([&sums[0].rgba, &sums[1].rgba], samples));
+    let counts = [samples.div_ceil(2), samples / 2];
+    let both = (halves == 2).then(|| [0, 1].map(|half| scale(&sums[half], 1.0 / counts[half] as f32)));
+    let error = (halves == 2).then(|| error_of_halves([&sums[0].rgba, &sums[1].rgba], counts));
     // The same arithmetic as shaders/pass/join.comp and accumulate.comp.
     let film = match &sums[..] {
         [a, b] => Picture {

@@ -188,13 +188,13 @@ impl Part {
         let place = path.display();
         let bytes = file::read(path)?;
         let texts =
-            exr::texts(&bytes).map_err(|_| anyhow!("{place} is not a part of a picture, or it is truncated"))?;
+            exr::texts(&bytes).with_context(|| format!("{place} is not a part of a picture, or it is truncated"))?;
         let text = texts.iter().find(|(name, _)| name == ATTRIBUTE).map(|(_, text)| text);
         let text = text.ok_or_else(|| anyhow!("{place} is not a part of a picture; render --shard writes parts"))?;
         let head: PartHeader =
             serde_json::from_str(text).with_context(|| format!("{place}: reading the header of the part"))?;
         ensure!(head.schema == SCHEMA, "{place} has schema {}, but this program reads {SCHEMA}", head.schema);
-        let channels = exr::decode_channels(&bytes).map_err(|_| anyhow!("{place} is truncated or damaged"))?;
+        let channels = exr::decode_channels(&bytes).with_context(|| format!("{place} is truncated or damaged"))?;
         let size = [channels.width, channels.height];
         ensure!(
             size == head.identity.size,

@@ -17,6 +17,8 @@ use super::{Aov, AovData, MAX_PIXELS, Picture};
 
 /// Largest plausible ratio of sample bytes to file bytes for any compression; files beyond it are refused.
 const MOST_EXPANSION: u64 = 1 << 14;
+/// Largest number of samples of all channels of a part to read.
+const MOST_SAMPLES: u64 = 32 * MAX_PIXELS;
 
 /// Writes `picture` and its AOVs to `path`, completely or not at all; see [`encode_exr`].
 pub fn write_exr(path: &Path, picture: &Picture, aovs: &[Aov], metadata: &[(String, String)]) -> Result<()> {
@@ -159,10 +161,10 @@ pub fn read_exr(path: &Path) -> Result<Picture> {
 
 /// Decodes the picture of an OpenEXR file.
 ///
-/// Takes `R G B` and `A` of the first part that has them, else the first complete `prefix.R .G .B` (files with
-/// layers only, such as Blender's), else the luminance `Y` as grey. Half and 32-bit integer samples become f32;
-/// missing alpha is 1. The picture is the display window: data outside it is dropped, and missing data inside it is
-/// transparent black. Chromaticities are not applied.
+/// Takes `R G B` and `A` of the first part that has them, else the complete `prefix.R .G .B` whose prefix ends in
+/// `Combined` (Blender's picture among its passes), else the first complete one, else the luminance `Y` as grey. Half
+/// and 32-bit integer samples become f32; missing alpha is 1. The picture is the display window: data outside it is
+/// dropped, and missing data inside it is transparent black. Chromaticities are not applied.
 pub fn decode_exr(bytes: &[u8]) -> Result<Picture> {
     let plain = |error: exr::error::Error| match error {
         exr::error::Error::Invalid(text) => anyhow!("the file is damaged: {text}"),
@@ -261,23 +263,44 @@ fn guard(meta: &MetaData, length: u64) -> Result<()> {
     Ok(())
 }
 
-fn find_source(meta: &MetaData) -> Result<ChannelSource> {
-    let mut names: Vec<String> = Vec::new();
-    for header in meta.headers.iter().filter(|header| !header.deep) {
-        names.extend(header.channels.list.iter().map(|channel| channel.name.to_string()));
+/// [`guard`] for a reader of all channels.
+fn guard_channels(meta: &MetaData, length: u64) -> Result<()> {
+    guard(meta, length)?;
+    for header in &meta.headers {
+        let (pixels, channels) = (header.layer_size.area() as u64, header.channels.list.len() as u64);
+        let samples = pixels.saturating_mul(channels);
+        ensure!(samples <= MOST_SAMPLES, "{samples} samples are too many; {MOST_SAMPLES} are the most that are read");
+        let bytes = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
+        ensure!(
+            bytes <= length.saturating_mul(MOST_EXPANSION),
+            "the file is damaged: {length} bytes cannot hold {channels} channels of {pixels} pixels"
+        );
     }
+    Ok(())
+}
+
+fn find_source(meta: &MetaData) -> Result<ChannelSource> {
+    let flat = meta.headers.iter().filter(|header| !header.deep);
+    let parts: Vec<Vec<String>> =
+        flat.map(|header| header.channels.list.iter().map(|channel| channel.name.to_string()).collect()).collect();
+    let names = parts.concat();
     let colour = |prefix: &str| {
         let named = |channel: &str| Text::from(format!("{prefix}{channel}").as_str());
         ChannelSource::Colour { red: named("R"), green: named("G"), blue: named("B"), alpha: named("A") }
     };
     let complete = |prefix: &str| {
-        ["R", "G", "B"].iter().all(|channel| names.iter().any(|name| *name == format!("{prefix}{channel}")))
+        let has =
+            |part: &Vec<String>| ["R", "G", "B"].iter().all(|channel| part.contains(&format!("{prefix}{channel}")));
+        parts.iter().any(has)
     };
     if complete("") {
         return Ok(colour(""));
     }
-    let prefixes = names.iter().filter_map(|name| name.strip_suffix('R')).filter(|prefix| prefix.ends_with('.'));
-    if let Some(prefix) = prefixes.into_iter().find(|prefix| complete(prefix)) {
+    let prefixes = names.iter().filter_map(|name| name.strip_suffix('R'));
+    let prefixes: Vec<&str> = prefixes.filter(|prefix| prefix.ends_with('.') && complete(prefix)).collect();
+    // Blender stores passes such as ambient occlusion before the picture.
+    let combined = prefixes.iter().find(|prefix| prefix.ends_with("Combined."));
+    if let Some(prefix) = combined.or(prefixes.first()) {
         return Ok(colour(prefix));
     }
     let has = |wanted: &str| names.iter().any(|name| name == wanted);
@@ -333,7 +356,7 @@ pub fn read_channels(path: &Path) -> Result<Channels> {
 pub fn decode_channels(bytes: &[u8]) -> Result<Channels> {
     let read = || -> Result<_> {
         let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(|error| anyhow!("{error}"))?;
-        guard(&meta, bytes.len() as u64)?;
+        guard_channels(&meta, bytes.len() as u64)?;
         let reader = exr::image::read::read().no_deep_data().largest_resolution_level().all_channels();
         let image = reader
             .first_valid_layer()
@@ -352,4 +375,18 @@ pub fn decode_channels(bytes: &[u8]) -> Result<Channels> {
         Ok(Channels { width: layer.size.x() as u32, height: layer.size.y() as u32, list: channels.collect() })
     };
     read()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_of_all_channels_bound_a_file() {
+        let bytes = encode_exr(&Picture::filled(64, 64, [0.0; 4]), &[], &[]).unwrap();
+        let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).unwrap();
+        assert!(guard_channels(&meta, bytes.len() as u64).is_ok());
+        // One byte may stand for so many pixels, but not for the 16 bytes of each.
+        assert!(guard(&meta, 1).is_ok() && guard_channels(&meta, 1).is_err());
+    }
 }

@@ -18,16 +18,21 @@ pub struct SampleError {
     pub rmse: f64,
 }
 
-/// Error estimate from two sums of `samples / 2` samples each. Their means a and b have independent errors of equal
-/// variance, so that (a − b)²/4 has the variance of the picture (a + b)/2 as expected value.
+/// Error estimate from two sums of n and m samples. Their means a and b have independent errors, whose variances are
+/// 1/n and 1/m of that of a sample, so that (a − b)² nm/(n + m)² has the variance of the mean of all samples as
+/// expected value; with n = m that is (a − b)²/4.
 #[must_use]
-pub fn error_of_halves(sums: [&[[f32; 4]]; 2], samples: u32) -> SampleError {
+pub fn error_of_halves(sums: [&[[f32; 4]]; 2], counts: [u32; 2]) -> SampleError {
+    let samples = counts[0] + counts[1];
     let scale = 1.0 / f64::from(samples);
+    let [n, m] = counts.map(f64::from);
+    let weights = [(m / n).sqrt(), (n / m).sqrt()];
     let of_chunk = |(a, b): (&[[f32; 4]], &[[f32; 4]])| {
         let (mut relative, mut squared) = (0.0, 0.0);
         for (a, b) in a.iter().zip(b).flat_map(|(a, b)| a[..3].iter().zip(&b[..3])) {
             let (a, b) = (f64::from(*a) * scale, f64::from(*b) * scale);
-            let (value, variance) = (a + b, (a - b) * (a - b));
+            let variance = (weights[0] * a - weights[1] * b).powi(2);
+            let value = a + b;
             relative += variance / (value * value + 0.01);
             squared += variance;
         }
@@ -62,10 +67,20 @@ mod tests {
         // Each half has errors of ±0.2 around 1, so the root mean square error of the mean is 0.1√2.
         let half = |signs: [f32; 4]| -> Vec<[f32; 4]> { signs.iter().map(|s| [8.0 * (1.0 + 0.2 * s); 4]).collect() };
         let (a, b) = (half([1.0, 1.0, -1.0, -1.0]), half([1.0, -1.0, 1.0, -1.0]));
-        let error = error_of_halves([&a, &b], 16);
+        let error = error_of_halves([&a, &b], [8, 8]);
         assert!((error.rmse - 0.2 / 2.0_f64.sqrt()).abs() < 1e-7, "{error:?}");
-        let same = error_of_halves([&a, &a], 16);
+        let same = error_of_halves([&a, &a], [8, 8]);
         assert_eq!((same.rmse, same.relmse), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_half_with_one_more_sample_is_no_error() {
+        let sum = |samples: f32| vec![[samples; 4]; 4];
+        let error = error_of_halves([&sum(3.0), &sum(2.0)], [3, 2]);
+        assert!(error.samples == 5 && error.rmse < 1e-12, "{error:?}");
+        // Means 1.2 and 0.8: the variance of the picture is 0.4² times 6/25.
+        let error = error_of_halves([&sum(3.6), &sum(1.6)], [3, 2]);
+        assert!((error.rmse - (0.16 * 0.24_f64).sqrt()).abs() < 1e-6, "{error:?}");
     }
 
     #[test]

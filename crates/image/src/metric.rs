@@ -143,7 +143,8 @@ pub struct Comparison {
 /// colours, and over alpha too where it is not 1 everywhere. psnr takes 1 as the peak of display values and the largest
 /// colour of the first picture as the peak of radiance. flip and ssim work on display values over middle grey: radiance
 /// is cut to 0..=1 and sRGB-encoded for them without a tone curve, and flip sees eight bits a channel at 67 pixels per
-/// degree. ssim is the mean over R, G and B of the mean over all complete 11x11 Gaussian windows.
+/// degree. ssim is the mean over R, G and B of the mean over all complete 11x11 Gaussian windows around a pixel that
+/// counts.
 pub fn compare(metric: Metric, a: &AnyPicture, b: &AnyPicture) -> Result<Comparison> {
     let (width, height) = a.size();
     ensure!(
@@ -158,28 +159,31 @@ pub fn compare(metric: Metric, a: &AnyPicture, b: &AnyPicture) -> Result<Compari
     ensure!(width > 0 && height > 0, "the pictures have no pixels");
     let (mut first, mut second) = (a.values(), b.values());
     let mut non_finite = [0u64; 2];
-    let mut left_out = 0usize;
+    let mut left_out = Vec::with_capacity(first.len());
     for (x, y) in first.iter_mut().zip(&mut second) {
         let bad = [x.iter().any(|s| !s.is_finite()), y.iter().any(|s| !s.is_finite())];
         non_finite[0] += u64::from(bad[0]);
         non_finite[1] += u64::from(bad[1]);
+        left_out.push(bad[0] || bad[1]);
         if bad[0] || bad[1] {
-            // Equal and black on both sides: no sum sees them and no window of ssim or flip is spoiled.
+            // Equal and black on both sides: sums over pixels get nothing, and windows of ssim and flip stay finite.
             (*x, *y) = ([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]);
-            left_out += 1;
         }
     }
-    let counted = first.len() - left_out;
+    let counted = left_out.iter().filter(|&&is_out| !is_out).count();
     ensure!(counted > 0, "no pixel is finite in both pictures");
     let linear = a.space() == "radiance";
     let (value, map) = match metric {
         Metric::Flip => {
-            let map = flip_map(width, height, &shown(&first, linear), &shown(&second, linear));
+            let mut map = flip_map(width, height, &shown(&first, linear), &shown(&second, linear));
+            // Flip spreads the errors of the neighbours.
+            map.iter_mut().zip(&left_out).filter(|(_, is_out)| **is_out).for_each(|(error, _)| *error = 0.0);
             let sum: f64 = map.iter().map(|&error| f64::from(error)).sum();
             (sum / counted as f64, map)
         }
         Metric::Ssim => {
-            let value = ssim(width as usize, height as usize, &shown(&first, linear), &shown(&second, linear))?;
+            let size = [width as usize, height as usize];
+            let value = ssim(size, [&shown(&first, linear), &shown(&second, linear)], &left_out)?;
             (value, absolute_map(&first, &second))
         }
         _ => (pointwise(metric, &first, &second, counted, linear), absolute_map(&first, &second)),
@@ -259,8 +263,8 @@ fn flip_map(width: u32, height: u32, a: &[[f64; 3]], b: &[[f64; 3]]) -> Vec<f32>
 const WINDOW: usize = 11;
 
 /// Mean structural similarity: Wang et al. 2004 with their window (11x11, standard deviation 1.5), K1 = 0.01,
-/// K2 = 0.03, range 1, over the windows that lie inside the picture.
-fn ssim(width: usize, height: usize, a: &[[f64; 3]], b: &[[f64; 3]]) -> Result<f64> {
+/// K2 = 0.03, range 1, over the windows that lie inside the picture and whose middle is not left out.
+fn ssim([width, height]: [usize; 2], [a, b]: [&[[f64; 3]]; 2], left_out: &[bool]) -> Result<f64> {
     ensure!(
         width >= WINDOW && height >= WINDOW,
         "ssim needs pictures of at least {WINDOW}x{WINDOW} pixels, these have {width}x{height}"
@@ -274,6 +278,9 @@ fn ssim(width: usize, height: usize, a: &[[f64; 3]], b: &[[f64; 3]]) -> Result<f
     kernel.iter_mut().for_each(|weight| *weight /= sum);
 
     let (across, down) = (width - WINDOW + 1, height - WINDOW + 1);
+    let is_counted = |top: usize, left: usize| !left_out[(top + WINDOW / 2) * width + left + WINDOW / 2];
+    let counted: usize = (0..down).map(|top| (0..across).filter(|&left| is_counted(top, left)).count()).sum();
+    ensure!(counted > 0, "the pixel in the middle of every window of ssim is NaN or infinite");
     let (c1, c2) = (0.01 * 0.01, 0.03 * 0.03);
     // Row sums of a, b, a², b², ab first, then columns: the window is a product of two.
     type Five = [f64; 5];
@@ -303,6 +310,7 @@ fn ssim(width: usize, height: usize, a: &[[f64; 3]], b: &[[f64; 3]]) -> Result<f
             .into_par_iter()
             .map(|top| {
                 (0..across)
+                    .filter(|&left| is_counted(top, left))
                     .map(|left| {
                         let mut sum = [0.0; 5];
                         kernel
@@ -316,7 +324,7 @@ fn ssim(width: usize, height: usize, a: &[[f64; 3]], b: &[[f64; 3]]) -> Result<f
                     .sum()
             })
             .collect();
-        rows.iter().sum::<f64>() / (across * down) as f64
+        rows.iter().sum::<f64>() / counted as f64
     };
     Ok((0..3).map(channel).sum::<f64>() / 3.0)
 }

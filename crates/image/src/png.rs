@@ -1,6 +1,6 @@
 //! Display pictures in 8-bit sRGB: written as PNG, read from PNG, JPEG and WebP.
 //!
-//! Read the PNG specification (W3C) for the chunks `sRGB`, `gAMA`, `cHRM` and `tEXt`.
+//! Read the PNG specification (W3C) for the chunks `sRGB` and `tEXt`.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -28,8 +28,7 @@ pub fn over([r, g, b, a]: [u8; 4], behind: u8) -> [u8; 3] {
 /// PNG file of the pixels `rgba`: four bytes per pixel, rows from the top, sRGB-encoded, straight alpha.
 ///
 /// Without `has_alpha` the fourth byte is dropped and the file holds RGB. The `sRGB` chunk (perceptual intent) states
-/// the encoding, together with the `gAMA` and `cHRM` that the PNG specification recommends beside it. The same input
-/// gives the same file.
+/// the encoding. The same input gives the same file.
 pub fn encode_png(width: u32, height: u32, rgba: &[u8], has_alpha: bool) -> Result<Vec<u8>> {
     encode_png_with([width, height], rgba, has_alpha, &[])
 }
@@ -148,8 +147,13 @@ pub fn decode_display(bytes: &[u8]) -> Result<Display> {
     let mut limits = ::image::Limits::default();
     limits.max_alloc = Some(super::MAX_PIXELS * 8);
     reader.limits(limits);
-    let decoded = reader.decode().map_err(|error| anyhow!("{error}"))?.into_rgba8();
-    let (width, height) = decoded.dimensions();
-    let rgba = decoded.as_raw().chunks_exact(4).map(|pixel| [pixel[0], pixel[1], pixel[2], pixel[3]]).collect();
-    Ok(Display { width, height, rgba })
+    let decoder = reader.into_decoder().map_err(|error| anyhow!("{error}"))?;
+    let (width, height) = ::image::ImageDecoder::dimensions(&decoder);
+    ensure!(
+        u64::from(width) * u64::from(height) <= super::MAX_PIXELS,
+        "{width}x{height} pixels are too many; {} are the most that are read",
+        super::MAX_PIXELS
+    );
+    let decoded = ::image::DynamicImage::from_decoder(decoder).map_err(|error| anyhow!("{error}"))?.into_rgba8();
+    Ok(Display { width, height, rgba: decoded.as_raw().as_chunks::<4>().0.to_vec() })
 }

@@ -158,6 +158,21 @@ fn png_keeps_bytes_and_says_srgb() {
     assert!(encode_png(31, 18, &rgba, true).is_err());
 }
 
+#[test]
+fn a_display_picture_with_too_many_pixels_is_refused() {
+    // One bit a pixel, so that the file is small.
+    let (width, height) = (16384, 8193);
+    let mut bytes = Vec::new();
+    let mut encoder = ::png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(::png::ColorType::Grayscale);
+    encoder.set_depth(::png::BitDepth::One);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&vec![0; (width / 8 * height) as usize]).unwrap();
+    writer.finish().unwrap();
+    let error = decode_display(&bytes).unwrap_err().to_string();
+    assert_eq!(error, "16384x8193 pixels are too many; 134217728 are the most that are read");
+}
+
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("the folder is there");
     let mut names: Vec<String> = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
@@ -249,7 +264,7 @@ fn exr_files_of_other_programs() {
     use ::exr::prelude::*;
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("other.exr");
-    let write = |names: [&str; 3], encoding: Encoding, half: bool, window: (i32, i32, usize, usize)| {
+    let write = |names: &[&str], encoding: Encoding, half: bool, window: (i32, i32, usize, usize)| {
         let values = |offset: usize| -> Vec<f32> { (0..15 * 9).map(|i| (i + offset) as f32).collect() };
         let list = names.iter().enumerate().filter(|(_, name)| !name.is_empty()).map(|(index, &name)| {
             let samples = values(index * 200);
@@ -278,24 +293,28 @@ fn exr_files_of_other_programs() {
         for blocks in [Blocks::ScanLines, Blocks::Tiles(Vec2(8, 4))] {
             for half in [false, true] {
                 let encoding = Encoding { compression, blocks, line_order: LineOrder::Increasing };
-                write(["R", "G", "B"], encoding, half, (0, 0, 15, 9));
+                write(&["R", "G", "B"], encoding, half, (0, 0, 15, 9));
                 let back = read_exr(&path).unwrap();
                 assert!((0..15 * 9).all(|i| back.rgba[i] == expected(i)), "{compression:?} {blocks:?} half {half}");
             }
         }
     }
     // Only a layer's channels: they are the picture all the same.
-    write(["View.R", "View.G", "View.B"], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    write(&["View.R", "View.G", "View.B"], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
     assert_eq!(read_exr(&path).unwrap().rgba[7], expected(7));
-    write(["Y", "", ""], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    // Blender's passes, with the picture after others.
+    let passes = ["View.AO.R", "View.AO.G", "View.AO.B", "View.Combined.R", "View.Combined.G", "View.Combined.B"];
+    write(&passes, Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    assert_eq!(read_exr(&path).unwrap().rgba[7], [607.0, 807.0, 1007.0, 1.0]);
+    write(&["Y", "", ""], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
     assert_eq!(read_exr(&path).unwrap().rgba[7], [7.0, 7.0, 7.0, 1.0]);
     // The display window begins one right of and two below the data, and ends beyond it.
-    write(["R", "G", "B"], Encoding::FAST_LOSSLESS, false, (1, 2, 16, 8));
+    write(&["R", "G", "B"], Encoding::FAST_LOSSLESS, false, (1, 2, 16, 8));
     let back = read_exr(&path).unwrap();
     assert_eq!((back.width, back.height), (16, 8));
     assert_eq!(back.rgba[0], expected(2 * 15 + 1));
     assert_eq!(back.rgba[15], [0.0; 4]);
-    write(["U", "V", ""], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
+    write(&["U", "V", ""], Encoding::FAST_LOSSLESS, false, (0, 0, 15, 9));
     let error = format!("{:#}", read_exr(&path).unwrap_err());
     assert!(error.ends_with("other.exr: there are no channels R, G and B, only U, V"), "{error}");
 }
