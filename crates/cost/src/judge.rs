@@ -3,6 +3,7 @@
 //!
 //! Evaluation is separate from drawing, so that pictures drawn early are compared with the final, better reference.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -15,12 +16,12 @@ use super::difference::{ShownReference, Truth, significant};
 use super::price::{Pair, PairedTimes, TimeNoise, price};
 use super::reference::display_of;
 use super::statistics::{Estimate, Interval, MANY, standard_errors};
-use super::table::{Errors, Family, Other, Point, Price, REFERENCE, Recommended, Reference, WorstPixel};
+use super::table::{Errors, Family, Other, Point, Price, REFERENCE, RESOLVED, Recommended, Reference, WorstPixel};
 use etalon::frame::Settings;
 use etalon::gpu::Compiled;
 use etalon::image::metric::{AnyPicture, map_rgba};
 use etalon::image::png::{Display, read_display};
-use etalon::image::{Picture, exr, file, png};
+use etalon::image::{exr, file, png};
 
 /// Half side in pixels of the detail around the place that differs most.
 const AROUND: i64 = 20;
@@ -32,6 +33,8 @@ const STRIDE: usize = 4;
 const CHEAP: [f64; 2] = [0.6, 2.0];
 /// Largest ratio of the times of `balanced` and `quick`.
 pub const DEARER: f64 = 10.0;
+/// Largest ratio of the error of `balanced` and the least for that time: a smaller gain is worth no time.
+pub const WORTH: f64 = 1.1;
 /// The reference itself is recommended as `exact` where no other point has an error below this multiple of its
 /// resolution.
 const FAR: f64 = 2.0;
@@ -202,9 +205,16 @@ impl Judge<'_> {
             size[1]
         );
         let (errors, _) = self.truth.errors(&film, &display)?;
-        let mean = |film: &Picture, c: usize| film.rgba.iter().map(|p| f64::from(p[c])).sum::<f64>();
-        let ratio = || [0, 1, 2].map(|c| mean(&film, c) / mean(&self.truth.film, c));
-        Ok(Other { file: name.to_owned(), errors, mean_ratio: radiance.then(ratio) })
+        let is_finite = |pixel: &[f32; 4]| pixel.iter().all(|value| value.is_finite());
+        let pixels = || film.rgba.iter().zip(&self.truth.film.rgba).filter(|&(x, r)| is_finite(x) && is_finite(r));
+        let ratio = |c: usize| {
+            let sums = pixels().fold([0.0; 2], |[x, r], (p, q)| [x + f64::from(p[c]), r + f64::from(q[c])]);
+            // A colour that both pictures lack is the same in both.
+            if sums == [0.0; 2] { 1.0 } else { sums[0] / sums[1] }
+        };
+        // JSON has no infinity.
+        let mean_ratio = radiance.then(|| [0, 1, 2].map(ratio)).filter(|all| all.iter().all(|ratio| ratio.is_finite()));
+        Ok(Other { file: name.to_owned(), errors, mean_ratio })
     }
 
     fn point(&self, record: &Record, display: &Display, gpu_ms: Interval) -> Result<Point> {
@@ -243,37 +253,55 @@ impl Judge<'_> {
         let limit = reference.map_or(f64::INFINITY, time);
         let mut order: Vec<usize> = (0..displays.len()).filter(|&i| time(i) < limit && some(&points[i])).collect();
         order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
-        let mut all: Vec<usize> = Vec::new();
-        let mut least: Option<usize> = None;
-        for i in order {
-            let more = |known: usize| self.truth.shown.more_error(&displays[i], &displays[known]);
-            let beaten = least.is_some_and(|least| more(least).is_above(sure));
-            let better = !beaten && all.last().is_none_or(|&last| more(last).is_below(sure));
-            if least.is_none_or(|least| points[i].error() < points[least].error()) {
-                least = Some(i);
-            }
-            if !better {
-                continue;
-            }
-            while all.last().is_some_and(|&last| time(i) < SAME_TIME * time(last)) {
-                all.pop();
-            }
-            all.push(i);
-        }
+        let differs = |a: usize, b: usize| match self.truth.shown.more_error(&displays[a], &displays[b]) {
+            more if more.is_above(sure) => Ordering::Greater,
+            more if more.is_below(sure) => Ordering::Less,
+            _ => Ordering::Equal,
+        };
+        let mut all = undominated(order, time, |i| points[i].error(), differs);
         all.extend(reference);
         all
     }
 }
 
+/// Those of `order`, the fastest first, that no quicker one beats. `differs` compares errors: `Equal` where the difference
+/// is not significant.
+fn undominated(
+    order: Vec<usize>,
+    time: impl Fn(usize) -> f64,
+    error: impl Fn(usize) -> f64,
+    differs: impl Fn(usize, usize) -> Ordering,
+) -> Vec<usize> {
+    let mut all: Vec<usize> = Vec::new();
+    let mut least: Option<usize> = None;
+    for i in order {
+        let beaten = least.is_some_and(|least| differs(i, least).is_gt());
+        let better = !beaten && all.last().is_none_or(|&last| differs(i, last).is_lt());
+        if least.is_none_or(|least| error(i) < error(least)) {
+            least = Some(i);
+        }
+        if !better {
+            continue;
+        }
+        while all.last().is_some_and(|&last| time(i) < SAME_TIME * time(last)) {
+            all.pop();
+        }
+        all.push(i);
+    }
+    all
+}
+
 /// Recommended settings from a frontier. `quick` is the fastest point from which no step is cheap ([`CHEAP`]).
-/// `balanced` has the least error for at most [`DEARER`] times the time of `quick`. `exact` is the most exact point, or
-/// the reference where no point comes close to it.
+/// `balanced` is the fastest whose error is within [`WORTH`] of the least for at most [`DEARER`] times the time of
+/// `quick`. `exact` is the most exact point, or the reference where no point is known to come close to it.
 fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     let (time, error) = (|i: usize| points[i].gpu_ms.median, |i: usize| points[i].error());
     let mut all = frontier.to_vec();
     if let [.., best, reference] = all[..]
         && points[reference].name == REFERENCE
         && error(best) < FAR * error(reference)
+        // An error below that of a noisy reference is unknown.
+        && (error(reference) <= RESOLVED || error(best) > error(reference))
     {
         all.pop();
     }
@@ -290,7 +318,9 @@ fn recommended(points: &[Point], frontier: &[usize]) -> Vec<Recommended> {
     }
     // Points of a frontier have less error the longer they take.
     let affordable = |&i: &usize| time(i) <= DEARER * time(quick);
-    let balanced = all.iter().copied().rfind(affordable).unwrap_or(quick);
+    let least = all.iter().copied().rfind(affordable).unwrap_or(quick);
+    let close = |&i: &usize| time(i) >= time(quick) && error(i) <= WORTH * error(least);
+    let balanced = all.iter().copied().find(close).unwrap_or(least);
     let named = [("quick", quick), ("balanced", balanced), ("exact", exact)];
     named.map(|(setting, point)| Recommended { setting: setting.to_owned(), point }).into()
 }
@@ -448,6 +478,33 @@ mod tests {
     }
 
     #[test]
+    fn no_quicker_point_beats_one_of_the_frontier() {
+        // Errors differ significantly from 0.1 on.
+        let frontier = |points: &[[f64; 2]]| {
+            let differs = |a: usize, b: usize| match points[a][1] - points[b][1] {
+                more if more > 0.1 => Ordering::Greater,
+                more if more < -0.1 => Ordering::Less,
+                _ => Ordering::Equal,
+            };
+            undominated((0..points.len()).collect(), |i| points[i][0], |i| points[i][1], differs)
+        };
+        assert_eq!(frontier(&[[1.0, 0.9], [2.0, 0.5], [3.0, 0.7], [4.0, 0.2]]), [0, 1, 3]);
+        // A step that is not significant does not hide the next one.
+        assert_eq!(frontier(&[[1.0, 0.50], [2.0, 0.41], [3.0, 0.39]]), [0, 2]);
+        assert_eq!(frontier(&[[1.0, 0.50], [2.0, 0.41], [3.0, 0.52]]), [0]);
+        assert_eq!(frontier(&[[1.0, 0.58], [2.0, 0.50], [3.0, 0.30], [4.0, 0.42], [5.0, 0.45]]), [0, 2]);
+        // The second is not significantly better than the first, but beats the third, which is.
+        let differs = |a: usize, b: usize| match (a, b) {
+            (2, 1) => Ordering::Greater,
+            (2, 0) => Ordering::Less,
+            _ => Ordering::Equal,
+        };
+        assert_eq!(undominated(vec![0, 1, 2], |i| i as f64 + 1.0, |i| [0.6, 0.5, 0.55][i], differs), [0]);
+        // Of two with the same time the better one stays.
+        assert_eq!(frontier(&[[1.0, 0.9], [1.01, 0.5], [3.0, 0.2]]), [1, 2]);
+    }
+
+    #[test]
     fn a_region_that_is_off_counts_more_than_noise() {
         let (width, height) = (64_usize, 40_usize);
         let mut random = SplitMix64::new(3);
@@ -488,9 +545,13 @@ mod tests {
         };
         // study:cornell and study:absorber at 128x72: the first step of absorber that is worth its time takes four
         // times as long, and no step of cornell within ten times the time is cheap.
-        assert_eq!(named(&[(1.44, 0.09545), (1.73, 0.08731), (4.15, 0.08515), (58.3, 0.07578)]), [0, 2, 4]);
+        assert_eq!(named(&[(1.44, 0.09545), (1.73, 0.08731), (4.15, 0.08515), (58.3, 0.07578)]), [0, 1, 4]);
         assert_eq!(named(&[(5.28, 0.06742), (19.64, 0.06582), (20.37, 0.02912)]), [0, 2, 3]);
         assert_eq!(named(&[(8.15, 0.01881)]), [0, 0, 1]);
+        // Nine times the time for one percent of the error, and for little after a step that gains more.
+        assert_eq!(named(&[(1.0, 0.100), (9.0, 0.099)]), [0, 0, 2]);
+        assert_eq!(named(&[(1.0, 0.100), (3.0, 0.082), (9.0, 0.080)]), [0, 1, 3]);
+        assert_eq!(named(&[(1.0, 0.100), (3.0, 0.080), (9.0, 0.050)]), [0, 2, 3]);
     }
 
     #[test]

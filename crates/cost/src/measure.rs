@@ -88,11 +88,16 @@ impl Measuring<'_> {
         }
         let begun = Instant::now();
         let drawn = self.bench.warm_up(&task.knobs).and_then(|mut warm| {
+            // The estimate was a guess; the warm-up has measured.
+            if self.pace.lacks(warm.sample_s * f64::from(task.knobs.samples.count())) {
+                return Ok(None);
+            }
             let measured = self.bench.measure(&mut warm, Some((&mut base.warm, &base.measured)), self.enough_ms)?;
-            Ok((warm.start_ms, measured))
+            Ok(Some((warm.start_ms, measured)))
         });
         let (start_ms, measured) = match drawn {
-            Ok(drawn) => drawn,
+            Ok(Some(drawn)) => drawn,
+            Ok(None) => return Ok(None),
             Err(error) => {
                 self.warnings.push(format!("\"{}\" cannot be drawn on this device: {error:#}", task.name));
                 return Ok(None);

@@ -117,15 +117,25 @@ impl<'a> Pace<'a> {
         if self.ends { (self.budget_s - self.took_s()).max(0.0) } else { self.forecast.left() }
     }
 
-    /// Whether there is no time for a picture; the picture is then counted as left out.
+    /// Whether there is no time for a picture of so many estimated seconds; the picture is then counted as left out.
     pub fn too_late(&mut self, expected: f64) -> bool {
-        let seconds = self.forecast.as_it_went(expected);
+        self.lacks(self.forecast.as_it_went(expected))
+    }
+
+    /// The same for measured seconds.
+    pub fn lacks(&mut self, seconds: f64) -> bool {
         let late = (self.stopped)() || self.ends && seconds + self.judged_s + self.reserved_s > self.left_s();
         if late {
             self.left_out += 1;
             self.left_out_s += seconds;
         }
         late
+    }
+
+    /// Whether there is time to evaluate all drawn pictures before the end, in addition to the evaluation at the end.
+    #[must_use]
+    pub fn can_judge(&self) -> bool {
+        self.left_s() > self.judging_s()
     }
 
     /// Leaves out the next `count` pictures.

@@ -124,6 +124,11 @@ impl Run<'_> {
         let wanted = self.wanted(&reference);
         let mut local = m.base(&base_task("local", Family::Preset, &agenda.local), listener.step)?;
         self.expect(&mut m, &agenda);
+        if self.ends() {
+            let begun = Instant::now();
+            Judge { truth: &truth, reference: &reference, folder }.judge(&m.records)?;
+            m.pace.judged(m.records.len(), begun.elapsed().as_secs_f64());
+        }
         // One preset besides `local` is drawn even if the reference needs the rest of the budget.
         let (first, presets) = agenda.presets.split_at(1.min(agenda.presets.len()));
         for task in first {
@@ -146,9 +151,12 @@ impl Run<'_> {
         }
         // The reference gets its share before the changes relative to `exact`, whose errors need a good reference.
         let share = std::mem::take(&mut m.pace.reserved_s);
+        let rounds = refined.rounds();
         refined = self.more(refined, &m.pace, wanted, share, listener)?;
-        (truth, reference) = self.describe(&refined, agenda.priced())?;
-        if self.ends() && f64::from(budget_s) >= EARLY_S {
+        if refined.rounds() > rounds {
+            (truth, reference) = self.describe(&refined, agenda.priced())?;
+        }
+        if self.ends() && f64::from(budget_s) >= EARLY_S && m.pace.can_judge() {
             let begun = Instant::now();
             let judge = Judge { truth: &truth, reference: &reference, folder };
             (listener.early)(&self.table(&judge.judge(&m.records)?, &m, &reference, states, &found))?;
@@ -160,8 +168,11 @@ impl Run<'_> {
         let tries_without_waste = shard == [1, 1] && m.records.iter().any(|record| record.name == "exact");
         // That takes a picture, for which all others are judged once more.
         let last_s = if tries_without_waste { m.pace.next_s() + m.pace.judging_s() } else { 0.0 };
+        let rounds = refined.rounds();
         refined = self.more(refined, &m.pace, wanted, m.pace.left_s() - last_s, listener)?;
-        (truth, reference) = self.describe(&refined, agenda.priced())?;
+        if refined.rounds() > rounds {
+            (truth, reference) = self.describe(&refined, agenda.priced())?;
+        }
         let judge = Judge { truth: &truth, reference: &reference, folder };
         if tries_without_waste {
             let prices = judge.judge(&m.records)?.prices;
@@ -407,7 +418,7 @@ impl Run<'_> {
         if !reference.converged {
             let [lacks, remedy] = reference.shortcoming(!self.ends());
             warnings.push(format!(
-                "do not trust differences below {:.2} %: the reference {lacks} after {} samples (target {:.1} %); {remedy}",
+                "errors below {:.2} % are not significant: the reference {lacks} after {} samples (target {:.1} %); {remedy}",
                 100.0 * reference.resolution,
                 reference.samples,
                 100.0 * RESOLVED

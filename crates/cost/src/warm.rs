@@ -60,6 +60,8 @@ pub struct WarmRenderer {
     pub renderer: Renderer,
     /// Wall milliseconds of the warm-up.
     pub start_ms: f64,
+    /// Wall seconds of its last sample, before which everything was compiled.
+    pub sample_s: f64,
 }
 
 /// A picture with its times.
@@ -161,8 +163,17 @@ impl Bench<'_> {
     pub fn warm_up(&self, knobs: &Knobs) -> Result<WarmRenderer> {
         let start = Instant::now();
         let mut renderer = self.renderer(knobs, self.settings.seed)?;
-        renderer.render_samples(self.camera, 2, &mut |_| ())?;
-        Ok(WarmRenderer { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3 })
+        let mut drawing = renderer.begin(self.camera, 2);
+        let mut sample = start;
+        while !drawing.is_done() {
+            if drawing.is_whole() {
+                sample = Instant::now();
+            }
+            renderer.step(&mut drawing)?;
+        }
+        let sample_s = sample.elapsed().as_secs_f64();
+        renderer.picture(&drawing)?;
+        Ok(WarmRenderer { renderer, start_ms: start.elapsed().as_secs_f64() * 1e3, sample_s })
     }
 
     /// A renderer for these knobs and this random seed, without drawing.

@@ -9,11 +9,10 @@ use maud::{Markup, html};
 
 use super::pictures::{WORST, embedded, size};
 use super::{command_line, command_text, digits, error, percent, plain, time, title, words};
-use crate::judge::DEARER;
+use crate::judge::{DEARER, WORTH};
 use crate::loss::{Loss, Simplified};
 use crate::statistics::Interval;
 use crate::table::{AtSize, Point, REFERENCE, RESOLVED, Recommended, Table};
-use etalon::plan::rungs::Indirect;
 
 /// Time of a recommended point at the requested size, in words.
 fn at_size<'a>(table: &'a Table, point: &Point) -> Option<(String, &'a AtSize)> {
@@ -56,16 +55,23 @@ pub(super) fn lead(table: &Table) -> Markup {
     let Some((_, point)) = balanced else {
         return html! { "No picture is faster than the reference: there is nothing to choose." };
     };
+    let r = &table.reference;
+    let [lacks, remedy] = r.shortcoming(table.reference_samples.is_some());
+    if !r.converged && point.name != REFERENCE && point.error() <= r.resolution {
+        return html! {
+            "No setting can be recommended yet: the " (words::link("reference", "reference")) " " (lacks) ", and no "
+            (words::link("error", "error")) " below " (percent(r.resolution)) " is significant; " (remedy) "."
+        };
+    }
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
-        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) " on " (table.device.name) @if table.device.kind == "cpu" { ", a CPU," }
+        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) (spread(table, point)) " on " (table.device.name)
+        @if table.device.kind == "cpu" { ", a CPU," }
         " and has an " (words::link("error", "error")) " of " (percent(point.error())) " of the range from black to white"
-        @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } "."
-        @if let Some(most) = most_lost(table, point) { " What you lose most by is " b { (most.0) } (in_parentheses(most.1)) ": " (most.0.about()) }
-        @if !table.reference.converged {
-            @let [lacks, _] = table.reference.shortcoming(table.reference_samples.is_some());
-            " The " (words::link("reference", "reference")) " " (lacks) ": do not trust differences below " (percent(table.reference.resolution)) "."
-        }
+        @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } ". "
+        (most_lost(table, point))
+        @if r.converged { " The " (words::link("reference", "reference")) " has converged: errors of " (percent(r.resolution)) " and more are significant." }
+        @else { " The " (words::link("reference", "reference")) " " (lacks) ": errors below " (percent(r.resolution)) " are not significant." }
         @if !seen { " No knob changes this picture visibly." }
     }
 }
@@ -84,11 +90,12 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
             Ok(html! {
                 article.setting {
                     h3 { (settings.join(" and ")) ": " (title(point)) }
+                    @if table.asked.is_some() { p.quiet { "drawn at " (table.size[0]) "×" (table.size[1]) } }
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
                     @if let Some(worst) = worst {
                         figure {
                             img.pixels src=(worst) width=(WORST[0]) height=(WORST[1]) alt="The pixels with the largest difference";
-                            figcaption { "where it differs most: the reference on the left, this picture on the right" }
+                            figcaption { "the place where it differs most, enlarged: the reference on the left, this picture on the right" }
                         }
                     }
                     table.facts { tbody {
@@ -107,7 +114,7 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     Ok(html! {
         section #settings {
             h2 { "Recommended settings" }
-            p { b { "quick" } " is the fastest setting that no cheap step improves; " b { "balanced" } " has the least error for at most " (plain(DEARER)) " times its time; " b { "exact" } " has the least error. An error in parentheses is what a more exact rung takes away; errors add by their squares." }
+            p { "A rung is a value of a knob, and a setting has a rung of every knob. " b { "quick" } " is the fastest setting, or a slower one with far less error for less than twice its time; " b { "balanced" } " is the fastest whose error is within " (plain(100.0 * (WORTH - 1.0))) " % of the least for at most " (plain(DEARER)) " times the time of quick; " b { "exact" } " has the least error. An error in parentheses is what a more exact rung takes away; errors add by their squares." }
             div.settings { @for card in &cards { (card) } }
         }
     })
@@ -125,12 +132,29 @@ fn visible<'a>(table: &'a Table, point: &'a Point) -> Vec<(Simplified<'a>, Loss)
     all
 }
 
-/// The simplification with the largest loss. Nothing where indirect light, often the largest one, was not measured.
-fn most_lost<'a>(table: &'a Table, point: &'a Point) -> Option<(Simplified<'a>, Loss)> {
-    let indirect = Indirect::Path.choice().knob;
-    let unknown = |choice: &Simplified<'_>| choice.knob.knob == indirect && choice.loss.is_none();
-    let all_known = !table.simplified(point).iter().any(unknown);
-    visible(table, point).first().copied().filter(|_| all_known)
+/// Part of a point's squared error that its measured losses add up to.
+fn explained(table: &Table, point: &Point) -> f64 {
+    let squares: f64 = visible(table, point).iter().map(|(_, loss)| loss.error.powi(2)).sum();
+    squares / point.error().powi(2)
+}
+
+/// Least part of the squared error of a loss that is called the largest, and of losses that explain an error.
+const MOSTLY: f64 = 0.5;
+
+/// The simplification that costs most of a point's accuracy, in a sentence, or that it was not measured.
+fn most_lost(table: &Table, point: &Point) -> Markup {
+    let (visible, all) = (visible(table, point), table.simplified(point));
+    let unknown = all.iter().filter(|choice| choice.loss.is_none()).count();
+    let most = visible.first().filter(|(_, loss)| loss.error.powi(2) >= MOSTLY * point.error().powi(2));
+    html! {
+        @if let Some((choice, loss)) = most { "It loses most by " b { (choice) } (in_parentheses(*loss)) ": " (choice.about()) }
+        @else if unknown > 0 && explained(table, point) < MOSTLY {
+            "What it loses most by is not known: " (unknown) @if unknown == 1 { " simplified knob was" } @else { " simplified knobs were" }
+            " not compared with a more exact rung."
+        }
+        @else if let Some((choice, loss)) = visible.first() { "Of what it simplifies, " b { (choice) } (in_parentheses(*loss)) " costs most: " (choice.about()) }
+        @else { "It loses nothing that is visible here." }
+    }
 }
 
 /// An error that a more exact rung takes away, in parentheses.
@@ -143,10 +167,11 @@ fn lost(table: &Table, point: &Point) -> Markup {
     let visible = visible(table, point);
     let (told, rest) = visible.split_at(visible.len().min(MOST));
     let all = table.simplified(point);
-    let folded = |list: &[Simplified<'_>], what: &str| {
+    let is_open = explained(table, point) < MOSTLY;
+    let folded = |list: &[Simplified<'_>], what: &str, open: bool| {
         html! {
             @if !list.is_empty() {
-                details.more {
+                details.more open[open] {
                     summary { (list.len()) " " (what) }
                     @for (i, choice) in list.iter().enumerate() { @if i > 0 { ", " } span title=(choice.about()) { (choice) } }
                 }
@@ -158,13 +183,15 @@ fn lost(table: &Table, point: &Point) -> Markup {
     };
     let rest: Vec<Simplified<'_>> = rest.iter().map(|(choice, _)| *choice).collect();
     html! {
-        @if point.name == REFERENCE { "nothing; noise is left" }
+        @if point.name == REFERENCE && table.reference.lacks_bands() { "bands of wavelengths; noise is left" }
+        @else if point.name == REFERENCE { "nothing; noise is left" }
         @else if all.is_empty() { "nothing" }
-        @else if told.is_empty() { "nothing that is visible here" }
+        @else if told.is_empty() && all.iter().all(|choice| choice.loss.is_some()) { "nothing that is visible here" }
+        @else if told.is_empty() { "not known" }
         @for (choice, loss) in told { p { b { (choice) } (in_parentheses(*loss)) ": " (choice.about()) } }
-        (folded(&rest, "more that are visible"))
-        (folded(&with(|loss| loss.is_some_and(|loss| loss.flip == 0.0)), "simplified, not visible here"))
-        (folded(&with(|loss| loss.is_none()), "simplified, not compared with a more exact rung"))
+        (folded(&rest, "more that are visible", false))
+        (folded(&with(|loss| loss.is_some_and(|loss| loss.flip == 0.0)), "simplified, not visible here", false))
+        (folded(&with(|loss| loss.is_none()), "simplified, not compared with a more exact rung", is_open))
     }
 }
 
@@ -191,12 +218,13 @@ pub(super) fn trust(table: &Table) -> Markup {
             h2 { "How far to trust it" }
             p.verdict.good[r.converged].poor[!r.converged] {
                 @if r.converged {
-                    "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more is significant. The difference between two pictures is known more precisely, because both are compared with the same noisy reference."
+                    "The " (words::link("reference", "reference")) " has converged: an " (words::link("error", "error")) " of " (percent(r.resolution)) " or more is significant."
                 } @else {
                     @let [lacks, remedy] = r.shortcoming(table.reference_samples.is_some());
-                    "The " (words::link("reference", "reference")) " " (lacks) ": do not trust differences below " (percent(r.resolution)) ". The target is "
+                    "The " (words::link("reference", "reference")) " " (lacks) ": no " (words::link("error", "error")) " below " (percent(r.resolution)) " is significant. The target is "
                     (plain(100.0 * RESOLVED)) " %; " (remedy) "."
                 }
+                " The difference between two pictures is known more precisely, because both are compared with the same noisy reference."
                 " A question mark marks a difference that may be noise. In at most 1 of 100 runs is any statement of this page "
                 "wrong due to noise: intervals are two standard errors wide to each side, but a statement is made only from "
                 (digits(table.standard_errors)) " standard errors on, because the page makes some two hundred of them."

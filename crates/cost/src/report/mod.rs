@@ -69,7 +69,11 @@ fn plain(x: f64) -> String {
 
 /// A time in milliseconds or seconds.
 fn time(ms: f64) -> String {
-    if ms >= 1000.0 { format!("{} s", digits(ms / 1000.0)) } else { format!("{} ms", digits(ms)) }
+    match ms {
+        600_000.0.. => format!("{} min", digits(ms / 60_000.0)),
+        1000.0.. => format!("{} s", digits(ms / 1000.0)),
+        _ => format!("{} ms", digits(ms)),
+    }
 }
 
 /// An error with its confidence interval.
