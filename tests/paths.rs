@@ -94,6 +94,8 @@ fn lights_with_a_shape_light_as_their_form_factors_say() {
             eprintln!("{what}, {model:?}: {mean:.6} ± {deviation:.6}, expected {radiance:.6}");
             // Neighbouring pixels have points of their own; the floor reaches 0.01 m from its middle.
             assert!((mean - radiance).abs() <= 4.0 * deviation + 2e-4 * radiance, "{what}: {mean}, not {radiance}");
+            // 16,384 samples, each off by no more than the mean: 1/128 of it.
+            assert!(deviation <= 0.008 * radiance, "{what}: {mean} ± {deviation}");
         }
         // The rung `points` knows no shapes.
         let film = draw(&gpu, &scene, None, settings([4, 4], &["samples=1", "lights=points"]));
@@ -115,14 +117,15 @@ fn more_light_samples_reduce_noise_and_keep_the_mean() {
     for places in ["area:1", "area:4", "area:16"] {
         let rung = format!("lights={places}");
         // One bounce: only the noise of direct light depends on the number of light samples.
-        let film = draw(&gpu, &scene, None, settings([32, 18], &["samples=16", "interfaces=1", &rung]));
-        let halves = |k: usize| film.rgba.iter().map(|p| f64::from(p[k])).collect::<Vec<_>>();
-        let green = halves(1);
-        means.push(green.iter().sum::<f64>() / green.len() as f64);
-        // Neighbours on the plain back wall and floor differ by noise and a smooth gradient.
-        let step = |i: usize| (green[i] - green[i + 1]).powi(2);
+        let green = [0, 1].map(|seed| {
+            let settings = settings([32, 18], &["samples=16", "interfaces=1", &rung]);
+            let film = draw(&gpu, &scene, None, Settings { seed, ..settings });
+            film.rgba.iter().map(|pixel| f64::from(pixel[1])).collect::<Vec<f64>>()
+        });
+        means.push(green[0].iter().sum::<f64>() / green[0].len() as f64);
+        // Pictures of two seeds differ by noise alone; the plain back wall and floor have no edges.
         let rows = (3..15).flat_map(|y| (4..8).map(move |x| y * 32 + x));
-        noise.push(rows.map(step).sum::<f64>());
+        noise.push(rows.map(|i: usize| (green[0][i] - green[1][i]).powi(2)).sum::<f64>());
         let [of_cpu, of_gpu] = [Architecture::Cpu, Architecture::Gpu].map(|architecture| {
             let settings = settings([32, 18], &["samples=4", "interfaces=4", &rung]);
             bits(&draw(&gpu, &scene, None, Settings { architecture: Some(architecture), ..settings }))
@@ -131,7 +134,7 @@ fn more_light_samples_reduce_noise_and_keep_the_mean() {
     }
     eprintln!("{means:?} {noise:?}");
     assert!(means.iter().all(|mean| (mean / means[2] - 1.0).abs() < 0.02), "{means:?}");
-    assert!(noise[2] < noise[0], "{noise:?}");
+    assert!(noise[0] > 1.5 * noise[2], "{noise:?}");
 }
 
 /// Half of a shape hidden by a wall gives half of its light.
@@ -308,6 +311,34 @@ fn light_from_points_and_from_afar_is_what_the_local_model_says() {
         let [mean, error, _] = spread(&paths, channel);
         let [wanted, _, _] = spread(&local, channel);
         assert!((mean - wanted).abs() < 5e-3 * wanted, "{channel}: {mean} ± {error} for {wanted}");
+    }
+}
+
+#[test]
+fn shadow_rays_leave_every_body_that_they_enter() {
+    let gpu = Gpu::open();
+    // Bodies of index 1 between a floor and a lamp: they reflect nothing, and light is absorbed on its way in them alone.
+    let lamp = DVec3::new(0.4, 0.2, 4.0);
+    let colors = [[0.3_f32, 0.6, 0.9], [0.8, 0.5, 0.4]];
+    for gap in [0.0, 0.5] {
+        let mut made = Made::new("two bodies");
+        made.add(Shape::panel(0.02, 0.02), lambert([0.5; 3]), DAffine3::IDENTITY);
+        for (color, z) in colors.into_iter().zip([1.25, 1.75 + gap]) {
+            let clear = Material { transmission: 1.0, thickness: 1.0, ior: 1.0, roughness: 0.0, ..lambert([1.0; 3]) };
+            let body = Material { attenuation_color: color, attenuation_distance: 1.0, ..clear };
+            made.add(Shape::cuboid(DVec3::new(2.0, 2.0, 0.5)), body, at(0.0, 0.0, z));
+        }
+        made.light([2.0; 3], LightKind::Point { position: lamp, range: None });
+        made.camera(DVec3::new(0.0, 0.0, 0.5), DVec3::ZERO, perspective(0.02));
+        let film = draw(&gpu, &made.0, None, settings([8, 8], &["samples=4"]));
+        let cos = lamp.z / lamp.length();
+        for channel in 0..3 {
+            let kept: f64 = colors.iter().map(|color| f64::from(color[channel]).powf(0.5 / cos)).product();
+            let wanted = 0.5 / std::f64::consts::PI * 2.0 * cos / lamp.length_squared() * kept;
+            let [mean, ..] = spread(&film, channel);
+            // Rays go on up to two offsets behind a surface (bvh.rs), of each of four.
+            assert!((mean / wanted - 1.0).abs() < 5e-5, "gap {gap}, channel {channel}: {mean}, not {wanted}");
+        }
     }
 }
 

@@ -388,7 +388,7 @@ fn path_guiding_brings_its_tables() {
     Case {
         choices: &["indirect=path", "lights=area:1", "guiding=photons"],
         brings: &[&["guiding spheres", "guiding cells", "path.path_guiding"]],
-        ..Case::hidden("path guiding", NONE, metal(0.3), metal(0.0))
+        ..Case::hidden("path guiding", NONE, chalk(), metal(0.0))
     }
     .check();
 }

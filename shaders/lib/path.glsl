@@ -78,10 +78,11 @@ vec3 shadow_ray_transmittance(ShadowRay shadow_ray) {
         Hit found = trace(shadow_ray.origin, shadow_ray.to_light, shadow_ray.source_face, last, goes_on ? shadow_ray_t_max(shadow_ray) : -1.0, OPAQUE | FILTER, false);
         bool at_surface = goes_on && found.triangle != NO_TRIANGLE;
         uint medium = present_medium(media);
+        float behind = 0.0;
         if (goes_on && ABSORPTION == ABSORPTION_PATH && medium != 0) {
             float end = at_surface ? found.t : min(shadow_ray.t_max, 1.0);
             // The last segment to a light at infinity has no end: its absorption is not counted.
-            float far = at_surface || shadow_ray.t_max == 1.0 ? (end - last.t) * size : 0.0;
+            float far = at_surface || shadow_ray.t_max == 1.0 ? max(end - last.t, 0.0) * size : 0.0;
             through *= absorbed(medium, shadow_ray.origin + shadow_ray.to_light * last.t, direction, far);
         }
         if (at_surface) {
@@ -94,8 +95,11 @@ vec3 shadow_ray_transmittance(ShadowRay shadow_ray) {
                 through *= interaction.boundary.suppressed_by_priority ? vec3(1.0) : 1.0 - interaction.hit.coverage + interaction.hit.coverage * passes;
                 bool enters = interaction.boundary.solid && (interaction.boundary.suppressed_by_priority || interaction.hit.coverage > 0.0);
                 media = enters ? interaction.boundary.media_out : media;
+                // Interfaces that coincide with this one have been crossed with it: the ray goes on behind them, as a path does.
+                bool crossed = COINCIDENT_INTERFACES && enters && !interaction.boundary.touches_opaque;
+                behind = crossed ? trace_terms.offset / max(-dot(interaction.hit.n, direction), 1.0 / 16.0) : 0.0;
             }
-            last = found;
+            last = behind > 0.0 ? Hit(found.t + behind / size, NO_TRIANGLE, 0.0, 0.0) : found;
         }
         if (goes_on) result = through;
         goes_on = at_surface && largest(through) > 0.0 && loop_iterations < LOOP_BUDGET;
@@ -222,7 +226,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     LightSample sampled = light;
     uint last = LIGHT_SAMPLES + (PHOTON_MAP ? 1u : 0u);
     for (uint i = 0; i <= last; i++) {
-        bool further = LIGHT_SAMPLES > 1 && i > 0 && i < LIGHT_SAMPLES;
+        bool further = EMITTERS > 0 && LIGHT_SAMPLES > 1 && i > 0 && i < LIGHT_SAMPLES;
         vec3 towards = i == last ? drawn.direction : normalize(sampled.to_light);
         if (further) {
             // 5. A further light sample; its shadow ray is traced below.

@@ -86,14 +86,15 @@ Primary primary_surface(ivec2 pixel, bool exact_normals) {
         }
     }
     // Interfaces of transparent solids lie between two media (lib/boundary.glsl).
-    if (IN_MEDIUM && m.transmission == 0.0) seen_from(s, index_of(present_medium(s.media)));
+    uint instance = r.drawn ? id.y & INSTANCE_BITS : 0u;
+    bool sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
+    if (IN_MEDIUM && (m.transmission == 0.0 || sheet)) seen_from(s, index_of(present_medium(s.media)));
     r.hit.s = s;
     r.hit.n = s.n_triangle;
     r.hit.front = (id.y & BACK_FACE) == 0;
     r.hit.coverage = 1.0;
     r.hit.transmits = STORED_TRANSMISSION ? m.transmission * t.transmission : 0.0;
-    uint instance = r.drawn ? id.y & INSTANCE_BITS : 0u;
-    r.hit.sheet = (instances[instance].flags & INSTANCE_SHEET) != 0;
+    r.hit.sheet = sheet;
     r.hit.thickness = instances[instance].scale * t.thickness;
     r.hit.material = material;
     r.hit.transmission = m.transmission;

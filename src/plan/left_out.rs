@@ -23,7 +23,8 @@ pub(super) fn left_out(
     let straight = |m: &Material| m.transmission > 0.0 && !(transmission.bends && m.alpha_mode != AlphaMode::Blend);
     let clear = |m: &Material| straight(m) || (m.transmission > 0.0 && !by_rays);
     say(&straight, "transmits light without refraction: refraction is off, or the material is alpha-blended");
-    say(&|m| clear(m) && m.roughness > 0.1, "has a rough surface that transmits light; it is drawn smooth");
+    let smoothed = |m: &Material| clear(m) && m.roughness > 0.1 && knobs.indirect != Indirect::Path;
+    say(&smoothed, "has a rough surface that transmits light; it is drawn smooth");
     let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
     say(&|m| !casts(m), "casts no shadow: shadow maps (shadows=map) contain only opaque and masked surfaces");
     let (absorption, marches) = (knobs.absorption, by_rays && knobs.absorption.steps() > 0);

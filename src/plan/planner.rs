@@ -18,7 +18,7 @@ use super::work::{Attenuation, LightSamples, March, Paths, Plan, Rays, Screen, S
 use crate::scene::lobe::{LOBES, SHEEN};
 use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
 use crate::transport::emitters::{bounded, is_emitter};
-use crate::transport::layers::{SMOOTHEST, deflects, is_smooth};
+use crate::transport::layers::{SMOOTHEST, deflects, immerses, is_smooth};
 
 /// Perceptual roughness up to which surfaces have screen-space reflections.
 const ROUGHEST_ON_SCREEN: f32 = 0.2;
@@ -413,6 +413,7 @@ impl Planner<'_> {
         let cause = match (followed, samples.emitting || around) {
             (false, _) => Cause::against("path tracing is off"),
             (_, false) => Cause::against("no light can be hit by a path"),
+            _ if !surfaces.any(scatters) => Cause::against("no visible material scatters light"),
             _ => surfaces.cause(is_smooth, |m| {
                 let does = if m.transmission > 0.0 { "refracts" } else { "reflects" };
                 format!("{does} light specularly")
@@ -428,11 +429,12 @@ impl Planner<'_> {
     /// Photons of punctual lights in path tracing: no path reaches such a light by way of a smooth surface.
     fn caustics(&mut self, followed: bool, lights: &Lights) -> u32 {
         let Self { scene, surfaces, decisions, knobs, .. } = self;
+        let immersed = surfaces.any(immerses);
         let cause = match (followed, lights.directional + lights.local) {
             (false, _) => Cause::against("path tracing is off"),
             (_, 0) => Cause::against("no punctual light shines"),
             _ => surfaces.cause(
-                |m| deflects(scene, m),
+                |m| deflects(scene, m, immersed),
                 |m| {
                     let does = if m.transmission > 0.0 { "refracts or reflects" } else { "reflects" };
                     format!("{does} the light of punctual lights specularly")
@@ -515,11 +517,13 @@ impl Planner<'_> {
         let transmissive = decisions.decide(EffectId::TransmissiveHits, cause);
         // An anisotropic lobe is wide along its direction, however smooth the material is across it.
         let wider = |m: &Material, bound: f32| m.roughness > bound || m.has_direction();
+        let immersed = surfaces.any(immerses);
         let rough = |m: &Material| {
             let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
             if *paths {
                 let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > SMOOTHEST;
-                return !m.unlit && (coat || (wider(m, SMOOTHEST) && (surfaces::mirrors(m) || m.transmission > 0.0)));
+                let base = surfaces::mirrors(m) || m.transmission > 0.0 || (immersed && m.ior == 1.0);
+                return !m.unlit && (coat || (wider(m, SMOOTHEST) && base));
             }
             (mirrors && surfaces::is_smooth(m, images.roughest) && (wider(m, 0.0) || coat))
                 || (m.transmission > 0.0 && wider(m, 0.0))

@@ -5,6 +5,7 @@ use super::facts::Facts;
 use super::work::March;
 use crate::scene::lobe::SHEEN;
 use crate::scene::{AlphaMode, Material, Meaning, Scene};
+use crate::transport::layers::immerses;
 pub use crate::transport::layers::mirrors;
 
 /// How transmissive and alpha-blended surfaces are rendered.
@@ -170,7 +171,8 @@ impl<'a> Surfaces<'a> {
             Some((closed, all)) if closed > 0 => format!("closed mesh in {closed} of {all} instances"),
             _ => "thin-walled".to_owned(),
         };
-        let bends = if material.ior == 1.0 { " (no refraction)" } else { "" };
+        let straight = material.ior == 1.0 && !self.any(immerses);
+        let bends = if straight { " (no refraction)" } else { "" };
         format!(
             "has transmission {}, thickness {} m, n = {}{bends}; {closed}",
             material.transmission, material.thickness, material.ior

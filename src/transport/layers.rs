@@ -16,6 +16,7 @@ use glam::DVec3;
 use crate::optics::brdf::visible_half_vector;
 use crate::optics::fresnel::{fresnel_conductor, fresnel_dielectric, nested_f0, normal_reflectance, schlick};
 use crate::optics::snell::{reflect, refract};
+use crate::scene::lobe::{IRIDESCENCE, LOBES};
 use crate::scene::material::Material;
 use crate::scene::solid::{Solids, media_at};
 use crate::scene::{AlphaMode, Scene, TextureRef};
@@ -304,10 +305,19 @@ pub fn coverage(m: &Material) -> Option<f64> {
     }
 }
 
-/// Whether the base of a surface has specular reflection. An index of refraction of 1 reflects nothing.
+/// Whether the base of a surface in air has specular reflection. An index of refraction of 1 reflects nothing, but a
+/// film on it does.
 #[must_use]
 pub fn mirrors(m: &Material) -> bool {
-    m.metallic > 0.0 || (m.specular > 0.0 && m.ior != 1.0)
+    let film = || LOBES[IRIDESCENCE].is_on(&m.lobes[IRIDESCENCE]);
+    m.metallic > 0.0 || (m.specular > 0.0 && m.ior != 1.0) || (m.ior == 1.0 && film())
+}
+
+/// Whether a material may enclose others in a medium of another index than 1, in which an index of 1 reflects and
+/// refracts.
+#[must_use]
+pub fn immerses(m: &Material) -> bool {
+    m.transmission > 0.0 && m.thickness > 0.0 && m.ior != 1.0 && m.alpha_mode != AlphaMode::Blend
 }
 
 /// Whether a surface has a specular (delta) lobe of reflection or transmission. A texture only lowers a factor.
@@ -319,16 +329,16 @@ pub fn is_smooth(m: &Material) -> bool {
 }
 
 /// Whether a surface may deflect light by a delta lobe: some texel is smooth, of what reflects, of a coat, or of what
-/// refracts.
+/// refracts. `immersed`: whether some material of the scene [immerses] it.
 #[must_use]
-pub fn deflects(scene: &Scene, m: &Material) -> bool {
+pub fn deflects(scene: &Scene, m: &Material, immersed: bool) -> bool {
     // Roughness is in the green channel, and a texture scales the factor.
     let smoothest = |factor: f32, texture: Option<TextureRef>| {
         let texels = texture.filter(|_| factor > SMOOTHEST).map(|texture| &scene.images[texture.image].rgba);
         let least = texels.and_then(|rgba| rgba.as_chunks::<4>().0.iter().map(|texel| texel[1]).min());
         factor * least.map_or(1.0, |least| f32::from(least) / 255.0)
     };
-    let bends = mirrors(m) || (m.transmission > 0.0 && m.ior != 1.0);
+    let bends = mirrors(m) || (m.transmission > 0.0 && m.ior != 1.0) || (m.ior == 1.0 && immersed);
     let base = bends && !m.has_direction() && smoothest(m.roughness, m.metallic_roughness_texture) <= SMOOTHEST;
     let coat = m.clearcoat > 0.0 && smoothest(m.clearcoat_roughness, m.clearcoat_roughness_texture) <= SMOOTHEST;
     !m.unlit && coverage(m) != Some(0.0) && (base || coat)

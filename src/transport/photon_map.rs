@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::aabb::Aabb;
 use super::bvh::{Bvh, Triangle};
-use super::layers::{coverage, deflects};
+use super::layers::{coverage, deflects, immerses};
 use super::line;
 use super::octahedral::{octahedral_from_unit, pack_snorm_2x8, pack_snorm_2x16};
 use super::photon_guiding::PhotonRandom;
@@ -139,7 +139,9 @@ enum PhotonSurface {
 impl PhotonSurface {
     /// By instance. Materials are looked at once each, because their textures are.
     fn of_instances(scene: &Scene, solids: &Solids) -> Vec<Self> {
-        let deflecting: Vec<bool> = scene.materials.iter().map(|material| deflects(scene, material)).collect();
+        let immersed = scene.materials.iter().any(immerses);
+        let deflecting: Vec<bool> =
+            scene.materials.iter().map(|material| deflects(scene, material, immersed)).collect();
         let of = |(instance, placed): (usize, &Instance)| {
             let index = scene.meshes[placed.mesh].material;
             let material = &scene.materials[index];

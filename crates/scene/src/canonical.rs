@@ -27,10 +27,22 @@ pub fn canonicalise(scene: &mut Scene) -> CanonicalForm {
         mesh.colors = Shared::default();
     }
     for (index, material) in materials.iter_mut().enumerate() {
+        if material.unlit {
+            keep_base_alone(material);
+        }
         form.black.extend(fold_black(material, images).into_iter().map(|of| format!("{of} of \"{}\"", material.name)));
         fold_alpha(index, material, meshes, images, &mut form);
     }
     form
+}
+
+/// Removes what an unlit surface does not show: all but its base colour.
+fn keep_base_alone(material: &mut Material) {
+    let Material { emissive_texture, transmission_texture, clearcoat_texture, emission, conductor, .. } = material;
+    [emissive_texture, transmission_texture, clearcoat_texture].into_iter().for_each(|texture| *texture = None);
+    (*emission, *conductor, material.conductor_spectra) = (None, None, None);
+    (material.emissive, material.transmission, material.clearcoat) = ([0.0; 3], 0.0, 0.0);
+    material.lobes = Material::default().lobes;
 }
 
 /// Sets each factor to 0 whose texture is black in the channels that multiply it, and returns the names of these
@@ -109,6 +121,19 @@ fn fold_alpha(index: usize, material: &mut Material, meshes: &mut [Mesh], images
 mod tests {
     use super::*;
     use crate::Sampler;
+
+    #[test]
+    fn an_unlit_material_transmits_and_emits_nothing() {
+        let mut scene = scene(AlphaMode::Opaque, 1.0, Some(255), &[]);
+        let lit = Material { transmission: 1.0, clearcoat: 1.0, emissive: [1.0; 3], ..scene.materials[0].clone() };
+        scene.materials = vec![Material { unlit: true, ..lit.clone() }, lit];
+        canonicalise(&mut scene);
+        let left = |m: &Material| (m.transmission, m.clearcoat, m.emissive, m.base_color_texture.is_some());
+        assert_eq!(
+            scene.materials.iter().map(left).collect::<Vec<_>>(),
+            [(0.0, 0.0, [0.0; 3], true), (1.0, 1.0, [1.0; 3], true)]
+        );
+    }
 
     fn scene(alpha_mode: AlphaMode, alpha: f32, texels: Option<u8>, vertices: &[f32]) -> Scene {
         let texture =

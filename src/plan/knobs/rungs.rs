@@ -65,7 +65,7 @@ effects! {
     Dispersion = "dispersion":
         "a refracting solid whose index depends on wavelength, with `colour=spectral:N`" => "parts of the bands, one for each sample",
     AlphaTest = "alpha test in rays":
-        "an alpha mask, or alpha blending, on a surface that rays may meet" => "code",
+        "an alpha mask on a surface that rays may meet" => "code",
     TransparentShadows = "transparent shadows":
         "a transparent or transmissive surface that shadow rays may meet" => "code",
     TransmissiveHits = "transmissive hits":
