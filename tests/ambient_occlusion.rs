@@ -84,7 +84,8 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
             let q = albedo[channel] * obscured;
             let expected = (share + q * (1.0 - obscured) * brightness) / (1.0 - q * q);
             let got = f64::from(occluded.rgba[i][channel]) / f64::from(plain.rgba[i][channel]);
-            worst = worst.max((got - expected).abs());
+            let error = (got - expected).abs();
+            worst = worst.max(if error.is_nan() { f64::INFINITY } else { error });
             darker += usize::from(share < 0.9);
         }
         compared += 1;

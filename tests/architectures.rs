@@ -70,6 +70,8 @@ const SCENES: [&str; 8] = ["etalon", "pool", "nested", "torture", "haze", "lamps
 fn by_rays_are_the_same(settings: &Settings, names: &[&str]) {
     if Gpu::hasty().device.is_software() {
         are_the_same(settings, names);
+    } else {
+        eprintln!("skipped: by rays both forms are compared on software devices alone");
     }
 }
 

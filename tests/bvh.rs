@@ -617,7 +617,7 @@ fn validation_names_what_is_wrong() {
         (wrong(&|b| set_root(b, &|_, children| children[1] = children[0])), "the child of two nodes or twice of one"),
         (wrong(&|b| set_root(b, &|_, children| children[0] = 0)), "does not come after it"),
         (wrong(&|b| set_root(b, &|_, children| children[1] = 4000)), "but there are"),
-        (wrong(&|b| set_root(b, &|_, children| children[1] += 1)), "is"),
+        (wrong(&|b| set_root(b, &|_, children| children[1] += 1)), "is no node's child"),
         (
             wrong(&|b| set_root(b, &|bounds, _| bounds.max[1] = bounds.max[1].next_down())),
             "does not contain its child's",

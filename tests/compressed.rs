@@ -203,6 +203,8 @@ fn turned(indices: &[u32]) -> Vec<[u32; 3]> {
 
 fn largest<const N: usize>(a: &[[f32; N]], b: &[[f32; N]]) -> f32 {
     assert_eq!(a.len(), b.len());
+    // The largest of numbers does not see NaN.
+    assert!(a.as_flattened().iter().chain(b.as_flattened()).all(|x| x.is_finite()));
     a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 

@@ -456,6 +456,7 @@ fn light_that_passes_a_grid_is_weakened_along_its_own_way() {
                     .zip(&ways)
                     .map(|(body, way)| way.map_or(0.0, |[a, b]| body.depth(p + to * a, p + to * b, c, 16, "midpoint")))
                     .sum();
+                assert!(lit.rgba[i][c] > 0.0, "{name}, pixel {i}: no light without shadows");
                 let share = f64::from(film.rgba[i][c]) / f64::from(lit.rgba[i][c]);
                 least = least.min(share);
                 worst = worst.max((share - (-depth).exp()).abs());

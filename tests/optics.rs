@@ -317,19 +317,24 @@ fn a_prism_deviates_by_snells_law_applied_twice() {
         let [near, far] = [1.0, 3.0].map(at_distance);
         // The other face's angle from the geometry of the prism, not from the direction.
         let want = i + (apex.sin() * (n * n - i.sin().powi(2)).sqrt() - apex.cos() * i.sin()).asin() - apex;
-        let mut worst = 0.0_f64;
+        let (mut worst, mut sum) = (0.0_f64, 0.0);
         for (near, far) in near.rgba.iter().zip(&far.rgba) {
-            let along = on_card(*far, 14.0).0 - on_card(*near, 14.0).0;
-            worst = worst.max(((along.x / 2.0).atan() - want).abs()).max(along.y.abs() / 2.0);
+            let ((near, here), (far, there)) = (on_card(*near, 14.0), on_card(*far, 14.0));
+            // The place of a black pixel is NaN. Half of the light arrives where it grazes the face of exit.
+            assert!(here.min(there) > 0.25, "incidence {incidence}: shares {here} and {there} of the light");
+            let along = far - near;
+            let deviation = (along.x / 2.0).atan();
+            worst = worst.max((deviation - want).abs()).max(along.y.abs() / 2.0);
+            sum += deviation;
         }
         eprintln!("incidence {incidence:.2}°: deviation {:.4}°, {worst:e} rad off", want.to_degrees());
         // Places on the card are good to 2e-6 m on 2 m; near grazing exit the angle grows tenfold.
         assert!(worst < 4e-6, "incidence {incidence}: {worst:e} rad");
-        deviations.push(want);
+        deviations.push(sum / f64::from(size[0] * size[1]));
     }
     let smallest = deviations.iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!(smallest, deviations[3]);
-    assert!((smallest - (2.0 * least - apex)).abs() < 1e-12);
+    assert!((smallest - (2.0 * least - apex)).abs() < 4e-6, "{deviations:?}");
 }
 
 #[test]
@@ -1302,10 +1307,11 @@ fn two_slabs_that_touch_shift_a_ray_as_both_do() {
             // Reflections between the faces add a few percent of light from nearby.
             let error = (on_card(pixel, 10.0).0 - want).length();
             worst = worst.max(error);
-            wrong += usize::from(error > 0.1);
+            // NaN where nothing of the card is seen.
+            wrong += usize::from(error.is_nan() || error > 0.1);
         }
         eprintln!("{indices:?}: {worst} m, {wrong} pixels, {} stray", rendered.work.unmatched_exits);
-        assert_eq!(wrong, 0, "{indices:?}: {worst} m");
+        assert_eq!((wrong, rendered.work.unmatched_exits), (0, 0), "{indices:?}: {worst} m");
     }
 }
 

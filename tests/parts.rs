@@ -29,12 +29,12 @@ struct Shot {
 fn shot(gpu: &Gpu, scene: &Scene, environment: Option<&Environment>, settings: Settings, parts: &[Part]) -> Shot {
     let mut renderer = gpu.renderer(scene, environment, Settings { parts: parts.to_vec(), ..settings });
     let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
-    Shot {
-        film: renderer.film().expect("the film"),
-        parts: BOTH.map(|part| renderer.part(part).expect("a part")),
-        rendered,
-        warnings: renderer.warnings.clone(),
-    }
+    let film = renderer.film().expect("the film");
+    let parts = BOTH.map(|part| renderer.part(part).expect("a part"));
+    // Comparisons do not see NaN.
+    let all = std::iter::once(&film).chain(parts.iter().flatten());
+    assert!(all.flat_map(|picture| picture.rgba.iter().flatten()).all(|value| value.is_finite()));
+    Shot { film, parts, rendered, warnings: renderer.warnings.clone() }
 }
 
 fn glass(n: f32) -> Material {

@@ -118,12 +118,13 @@ fn refraction_obeys_snell_and_can_be_undone() {
 fn a_chain_of_reflections_keeps_its_length() {
     let gpu = Gpu::open();
     let mut draw = SplitMix64::new(3);
-    let mut drift = |tier| {
+    let mut drift = |tier: Tier| {
         let mut directions: Vec<DVec3> = (0..1000).map(|_| draw.direction()).collect();
         let mut longest: f64 = 0.0;
         for _ in 0..256 {
             let rows: Vec<Vec<f32>> = directions.iter().map(|v| columns(&[*v, draw.direction()])).collect();
             directions = evaluate(&gpu, "reflect", tier, &rows).iter().map(|r| vector(&wide(r), 0)).collect();
+            assert!(directions.iter().all(|v| v.is_finite()), "{}: NaN or infinity", tier.name());
             longest = directions.iter().fold(longest, |all, v| all.max((v.length() - 1.0).abs()));
         }
         longest

@@ -80,6 +80,9 @@ fn compare_stored(gpu: &Gpu, scene: &Scene, camera: &Camera, stored: &[&str]) ->
         let material = &scene.materials[want.material];
         assert_eq!((got.material, got.instance), (want.material as u32 + 1, want.instance as u32 + 1), "{here}: ids");
         let vector = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+        // The largest of numbers does not see NaN.
+        let vectors = [got.p_rel, got.normal, got.geometric_normal].map(vector);
+        assert!(got.distance.is_finite() && vectors.iter().all(|v| v.is_finite()), "{here}: {got:?}");
         let center = (f64::from(i as u32 % SIZE[0]) + 0.5, f64::from(i as u32 / SIZE[0]) + 0.5);
         let beside = |dx: f64, dy: f64| {
             let ray = etalon_testing::raycast::camera_ray(camera, SIZE[0], SIZE[1], center.0 + dx, center.1 + dy);

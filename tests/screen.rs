@@ -406,7 +406,8 @@ fn refraction_shows_nothing_in_front_of_the_glass() {
     for (i, at) in pixels(SIZE) {
         let hit = world.closest(&camera_ray(&made.0.cameras[0], SIZE[0], SIZE[1], at.x, at.y)).expect("the plate");
         if hit.instance == 0 {
-            assert!(hue(&film.rgba[i]).unwrap_or_default().x < 3.0, "{at}: the post in the plate");
+            let hue = hue(&film.rgba[i]);
+            assert!(hue.is_some_and(|hue| hue.x < 3.0), "{at}: the post in the plate, or nothing: {hue:?}");
         }
     }
 }

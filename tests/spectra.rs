@@ -98,15 +98,14 @@ fn reflected(light: &[(Band, [f64; 3])], reflectance: &Spectrum, times: i32) -> 
     sum
 }
 
-/// To 0.3. Of 120 figures one is further off: the largest difference of 8 bands under F11 after two reflections, 8.2
-/// for 7.9. There spectra are linear between 5 nm, as the CIE has it for these lamps; the tables were made with a
-/// rounder curve through its lines.
+/// To 0.3, and small figures to a quarter and the rounding of the tables. Of 120 figures one is further off: the
+/// largest difference of 8 bands under F11 after two reflections, 8.2 for 7.9. There spectra are linear between 5 nm,
+/// as the CIE has it for these lamps; the tables were made with a rounder curve through its lines.
 fn check(got: [f64; 2], wanted: [f64; 2], what: &str) {
     eprintln!("{what}: {:.2} / {:.2}, docs/colour.md {} / {}", got[0], got[1], wanted[0], wanted[1]);
-    assert!(
-        (got[0] - wanted[0]).abs() <= 0.3 && (got[1] - wanted[1]).abs() <= if wanted[1] == 7.9 { 0.32 } else { 0.3 },
-        "{what}: {got:?}, not {wanted:?}"
-    );
+    let bound = |wanted: f64| if wanted == 7.9 { 0.32 } else { 0.3_f64.min(0.25 * wanted + 0.02) };
+    let near = |k: usize| (got[k] - wanted[k]).abs() <= bound(wanted[k]);
+    assert!(near(0) && near(1), "{what}: {got:?}, not {wanted:?}");
 }
 
 #[test]

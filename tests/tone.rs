@@ -223,7 +223,9 @@ fn light_beyond_f32_is_counted_as_infinite() {
     made.light([1e38; 3], kind);
     made.front(1.0);
     for tonemap in CURVES {
-        let (rendered, film) = gpu.shot(&made.0, None, Settings { tonemap, ..settings([64, 36]) });
+        let mut renderer = gpu.renderer(&made.0, None, Settings { tonemap, ..settings([64, 36]) });
+        let rendered = renderer.render(&made.0.cameras[0], &mut |_| ()).expect("a picture");
+        let film = renderer.film().expect("the film");
         let infinite = film.rgba.iter().filter(|p| p.iter().any(|v| v.is_infinite())).count();
         let nan = film.rgba.iter().filter(|p| p.iter().any(|v| v.is_nan())).count();
         eprintln!("{tonemap:?}: {:?}", rendered.counts);

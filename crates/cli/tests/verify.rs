@@ -63,6 +63,34 @@ fn json_has_the_names_of_the_contract() {
     }
 }
 
+/// The sine of 30° is 1/2.
+#[test]
+fn eval_prints_the_value_of_every_tier() {
+    let json = document(&run(&["eval", "--json", "critical_angle", "n_in=2", "n_out=1", "--validate"]).succeeded());
+    let outputs = json["outputs"].as_array().expect("outputs");
+    let degrees = outputs.iter().find(|output| output["output"] == "theta_deg").expect("an angle");
+    // In the textbook form Vulkan allows 4096 ulp of the angle in radians, 0.014°; the others promise 5.
+    for (tier, bound) in [("fast", 1.4e-2), ("stable", 1e-5), ("compensated", 1e-5), ("twin", 1e-12)] {
+        let value = degrees[tier].as_f64().expect("a number");
+        assert!((value - 30.0).abs() < bound, "{tier}: {value}");
+    }
+}
+
+/// Blinn and Phong's lobe changes when light and viewer change places, and the reciprocal one does not.
+#[test]
+fn plot_tells_what_an_exchange_of_two_vectors_changes() {
+    let difference = |function: &str, column: &str| {
+        let inputs = "--over L=-80..80 --swap L,V N=0 V=60 Lin=1 kd=0 ks=1 shine=20 -o x.svg";
+        let line = format!("plot {function} --column {column} {inputs}");
+        let said = run(&line.split(' ').collect::<Vec<_>>()).succeeded().stdout;
+        let (_, rest) = said.split_once("largest difference ").expect("a difference");
+        rest.split_whitespace().next().and_then(|number| number.parse::<f64>().ok()).expect("a number")
+    };
+    // At L = -75°: cos²⁰ 7.5° (1/cos 75° − 1/cos 60°) is 1.6.
+    let (phong, reciprocal) = (difference("blinn_phong", "Lref/cos_in"), difference("reciprocal_phong", "fr_spec"));
+    assert!(phong > 1.0 && reciprocal < 1e-4, "{phong} and {reciprocal}");
+}
+
 #[test]
 fn the_same_seed_gives_the_same_figures() {
     let figures = |seed: &str| {

@@ -96,6 +96,7 @@ impl Gpu {
     pub fn shot(&self, scene: &Scene, environment: Option<&Environment>, settings: Settings) -> (Rendered, Picture) {
         let mut renderer = self.renderer(scene, environment, settings);
         let rendered = renderer.render(&scene.cameras[0], &mut |_| ()).expect("a picture");
+        assert_finite(&rendered);
         let film = renderer.film().expect("the film");
         (rendered, film)
     }
@@ -103,11 +104,19 @@ impl Gpu {
     /// Picture, G-buffer and view of one rendering.
     pub fn all(&self, scene: &Scene, camera: &Camera, settings: Settings) -> (Picture, Vec<AovPixel>, View) {
         let mut renderer = self.renderer(scene, None, settings);
-        renderer.render(camera, &mut |_| ()).expect("a picture");
+        assert_finite(&renderer.render(camera, &mut |_| ()).expect("a picture"));
         let film = renderer.film().expect("the film");
         let (aovs, view) = renderer.aovs(camera).expect("the G-buffer");
         (film, aovs, view)
     }
+}
+
+/// Most comparisons do not see NaN, so no picture for them may have any; nor may a path end in it.
+#[track_caller]
+pub fn assert_finite(rendered: &Rendered) {
+    let (counts, work) = (&rendered.counts, &rendered.work);
+    let found = (counts.nan, counts.inf, work.not_finite);
+    assert_eq!(found, (0, 0, 0), "NaN, infinities and lost paths: {:?}", work.first_not_finite);
 }
 
 /// The device of the tests.
@@ -176,11 +185,14 @@ pub fn bits(picture: &Picture) -> Vec<[u32; 4]> {
     picture.rgba.iter().map(|p| p.map(f32::to_bits)).collect()
 }
 
-/// Largest |a − b| / scale over the three colours of all pixels.
+/// Largest |a − b| / scale over the three colours of all pixels; infinite if one is NaN.
 pub fn largest_difference(a: &Picture, b: &Picture, scale: f64) -> f64 {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let all = a.rgba.iter().flatten().zip(b.rgba.iter().flatten());
-    all.fold(0.0, |most, (a, b)| most.max((f64::from(*a) - f64::from(*b)).abs() / scale))
+    all.fold(0.0, |most: f64, (a, b)| {
+        let difference = (f64::from(*a) - f64::from(*b)).abs() / scale;
+        most.max(if difference.is_nan() { f64::INFINITY } else { difference })
+    })
 }
 
 /// Mean of a channel over a picture, its standard error estimated from the pixels, and the largest value.

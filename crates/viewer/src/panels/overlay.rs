@@ -147,20 +147,37 @@ fn measured(canvas: &Canvas<'_>, points: &[DVec3]) {
 
 /// Text on a dark ground.
 pub(super) fn text(painter: &Painter, at: Pos2, align: Align2, text: &str) {
-    wrapped(painter, at, align, text, f32::INFINITY);
+    elided(painter, at, align, text, f32::INFINITY);
 }
 
-/// Text on a dark ground, in lines of at most `width` points.
-pub(super) fn wrapped(painter: &Painter, at: Pos2, align: Align2, text: &str, width: f32) {
-    let galley = painter.layout(text.to_owned(), FontId::monospace(12.0), Color32::WHITE, width);
+/// Text on a dark ground; lines longer than `width` points end in an ellipsis.
+pub(super) fn elided(painter: &Painter, at: Pos2, align: Align2, text: &str, width: f32) {
+    let laid = |text: String| painter.layout_no_wrap(text, FontId::monospace(12.0), Color32::WHITE);
+    let most = (width / laid("0".to_owned()).size().x) as usize;
+    let lines: Vec<String> = text.lines().map(|line| shortened(line, most)).collect();
+    let galley = laid(lines.join("\n"));
     let rect = align.anchor_size(at, galley.size());
     painter.rect_filled(rect.expand(4.0), 3.0, Color32::from_black_alpha(190));
     painter.galley(rect.min, galley, Color32::WHITE);
 }
 
+/// A line of at most `most` characters.
+fn shortened(line: &str, most: usize) -> String {
+    match line.char_indices().nth(most) {
+        None => line.to_owned(),
+        Some(_) => line.chars().take(most.saturating_sub(1)).chain(['…']).collect(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_lines_end_in_an_ellipsis() {
+        let texts = ["left", "left ×4", "left ×40"].map(|line| shortened(line, 7));
+        assert_eq!(texts, ["left", "left ×4", "left ×…"]);
+    }
 
     #[test]
     fn grids_have_round_steps() {

@@ -4,7 +4,7 @@
 use egui::{Align2, Color32, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Sense, Stroke, Ui};
 use glam::{DVec2, DVec3};
 
-use super::overlay::{self, AXES, Canvas, text, wrapped};
+use super::overlay::{self, AXES, Canvas, elided, text};
 use super::pixel::{colour, incidence};
 use super::{Action, Click, Clicked, PanelState};
 use crate::layer::SurfaceLayer;
@@ -286,7 +286,7 @@ fn wipe(ui: &mut Ui, rect: Rect, state: &mut PanelState, seen: &RenderState) {
             _ => (rect.right_bottom() + egui::vec2(-8.0, -8.0), Align2::RIGHT_BOTTOM),
         };
         // Each label stays in its half of the picture.
-        wrapped(&painter, at, align, &words, (0.5 * rect.width() - 20.0).max(40.0));
+        elided(&painter, at, align, &words, (0.5 * rect.width() - 20.0).max(40.0));
     }
 }
 
