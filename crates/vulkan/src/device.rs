@@ -23,7 +23,6 @@ use super::limits::{
 };
 use super::offers::Offers;
 use super::pace::{OF_FRAME, SliceTimes};
-use super::surface::Surface;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -125,6 +124,12 @@ fn keep_drivers_loaded(entry: &ash::Entry, extensions: &[*const c_char], flags: 
 /// The right of an instance to enable validation (`open.rs`).
 pub(super) type RightToValidate = Box<dyn Send + Sync>;
 
+/// What a surface supports (`vkGetPhysicalDeviceSurfaceSupportKHR`).
+pub(super) trait SurfaceSupport {
+    /// Whether a queue family can present to it.
+    fn supports(&self, physical: vk::PhysicalDevice, family: u32) -> bool;
+}
+
 /// The Vulkan instance with its loader and debug messenger.
 pub(super) struct Instance {
     pub(super) entry: ash::Entry,
@@ -207,13 +212,13 @@ impl Instance {
         Ok(Self { entry, raw, debug, has_debug_utils, messages, _right: right })
     }
 
-    fn candidates(&self, surface: Option<&Surface>) -> Result<Vec<Candidate>> {
+    fn candidates(&self, surface: Option<&dyn SurfaceSupport>) -> Result<Vec<Candidate>> {
         // SAFETY: plain queries on a live instance.
         let devices = unsafe { self.raw.enumerate_physical_devices() }.context("listing Vulkan devices")?;
         Ok(devices.into_iter().map(|physical| self.candidate(physical, surface)).collect())
     }
 
-    fn candidate(&self, physical: vk::PhysicalDevice, surface: Option<&Surface>) -> Candidate {
+    fn candidate(&self, physical: vk::PhysicalDevice, surface: Option<&dyn SurfaceSupport>) -> Candidate {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         // SAFETY: plain queries; the chain outlives the call.
@@ -242,10 +247,19 @@ impl Instance {
         let mut missing = self.missing(physical, properties.api_version, &offers, properties.limits);
         missing.extend(
             surface
-                .filter(|surface| !surface.is_shown_by(&self.raw, physical))
+                .filter(|surface| !self.presents_to(physical, *surface))
                 .map(|_| "a way to show pictures in this window".to_owned()),
         );
         Candidate { info, missing, offers, physical, is_lavapipe }
+    }
+
+    /// Whether a queue family can draw, compute and present to a surface.
+    fn presents_to(&self, physical: vk::PhysicalDevice, surface: &dyn SurfaceSupport) -> bool {
+        // SAFETY: a plain query.
+        let families = unsafe { self.raw.get_physical_device_queue_family_properties(physical) };
+        families.iter().enumerate().any(|(family, properties)| {
+            properties.queue_flags.contains(QUEUE) && surface.supports(physical, family as u32)
+        })
     }
 
     /// Required features and limits that the device lacks, each with the Mesa version that has it where an update
@@ -431,7 +445,7 @@ impl Device {
     pub(super) fn open_on(
         instance: Arc<Instance>,
         choice: &DeviceChoice,
-        surface: Option<&Surface>,
+        surface: Option<&dyn SurfaceSupport>,
         time_slices: bool,
     ) -> Result<Arc<Self>> {
         let Candidate { info, physical, offers, is_lavapipe, .. } = choose(instance.candidates(surface)?, choice)?;
@@ -449,8 +463,7 @@ impl Device {
             .iter()
             .enumerate()
             .position(|(i, f)| {
-                f.queue_flags.contains(QUEUE)
-                    && surface.is_none_or(|surface| surface.is_shown_by_family(physical, i as u32))
+                f.queue_flags.contains(QUEUE) && surface.is_none_or(|surface| surface.supports(physical, i as u32))
             })
             .ok_or_else(|| anyhow!("no queue with graphics and compute"))
             .with_context(opening)? as u32;

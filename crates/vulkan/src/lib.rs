@@ -34,7 +34,6 @@ mod recording;
 mod set;
 mod shader;
 mod specialize;
-mod surface;
 pub mod sync;
 mod tables;
 mod time_slices;

@@ -18,8 +18,7 @@ use super::device::{Device, Instance, lock};
 use super::memory::{Buffer, Image, ImageDesc, Place};
 use super::open;
 use super::recording::begin;
-use super::surface::Surface;
-use super::window::{Windowed, extensions};
+use super::window::{Surface, Windowed, extensions};
 
 /// A picture with its rectangle in the window.
 #[derive(Debug, Clone, Copy)]
@@ -203,15 +202,7 @@ impl Presenter {
             }
             // A covered window, or one on another desktop, may get no image while it is hidden.
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Presented::Changed),
-            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
-                self.stale = true;
-                return Ok(Presented::Changed);
-            }
-            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => {
-                self.renew_surface()?;
-                return Ok(Presented::Changed);
-            }
-            Err(error) => return Err(error).context("asking for the next picture of the window"),
+            Err(error) => return self.renewed_after(error, "asking for the next picture of the window"),
         };
         let commands = self.record(index, pictures, &overlay)?;
         self.submit(commands, index)?;
@@ -225,17 +216,19 @@ impl Presenter {
         drop(queue);
         match shown {
             Ok(suboptimal) => self.stale |= suboptimal,
-            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
-                self.stale = true;
-                return Ok(Presented::Changed);
-            }
-            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => {
-                self.renew_surface()?;
-                return Ok(Presented::Changed);
-            }
-            Err(error) => return Err(error).context("showing a picture in the window"),
+            Err(error) => return self.renewed_after(error, "showing a picture in the window"),
         }
         Ok(Presented::Shown)
+    }
+
+    /// Renews a swapchain that is out of date or a surface that is lost; other errors are errors.
+    fn renewed_after(&mut self, error: vk::Result, doing: &'static str) -> Result<Presented> {
+        match error {
+            vk::Result::ERROR_OUT_OF_DATE_KHR => self.stale = true,
+            vk::Result::ERROR_SURFACE_LOST_KHR => self.renew_surface()?,
+            error => return Err(error).context(doing),
+        }
+        Ok(Presented::Changed)
     }
 
     /// Waits until the previous frame has finished, and frees its command buffer and textures.

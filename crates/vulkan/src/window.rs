@@ -7,11 +7,10 @@ use std::ffi::c_char;
 use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
-use ash::khr;
+use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
-use super::device::Instance;
-use super::surface::Surface;
+use super::device::{Instance, SurfaceSupport};
 
 /// A window with the handles that a Vulkan surface needs.
 pub trait Windowed: HasDisplayHandle + HasWindowHandle + Send + Sync {}
@@ -21,6 +20,28 @@ impl<W: HasDisplayHandle + HasWindowHandle + Send + Sync> Windowed for W {}
 pub(super) fn extensions(window: &dyn Windowed) -> Result<&'static [*const c_char]> {
     let display = window.display_handle().context("asking the window for its display")?;
     ash_window::enumerate_required_extensions(display.as_raw()).context("asking what this display takes")
+}
+
+/// A `VkSurfaceKHR`; its owner drops it after its swapchain and before its window.
+pub(super) struct Surface {
+    pub(super) calls: khr::surface::Instance,
+    pub(super) raw: vk::SurfaceKHR,
+    /// Destroyed after the surface.
+    _instance: Arc<Instance>,
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: the owner has destroyed the swapchain.
+        unsafe { self.calls.destroy_surface(self.raw, None) };
+    }
+}
+
+impl SurfaceSupport for Surface {
+    fn supports(&self, physical: vk::PhysicalDevice, family: u32) -> bool {
+        // SAFETY: a plain query of a live surface.
+        unsafe { self.calls.get_physical_device_surface_support(physical, family, self.raw) }.unwrap_or_default()
+    }
 }
 
 impl Surface {
