@@ -264,8 +264,8 @@ impl Judge<'_> {
     }
 }
 
-/// Those of `order`, the fastest first, that no quicker one beats. `differs` compares errors: `Equal` where the difference
-/// is not significant.
+/// Those of `order`, the fastest first, that no quicker one beats. `differs` compares errors; `Equal` is a difference
+/// that is not significant.
 fn undominated(
     order: Vec<usize>,
     time: impl Fn(usize) -> f64,
