@@ -323,7 +323,7 @@ fn light_from_points_and_from_afar_is_what_the_local_model_says() {
 #[test]
 fn shadow_rays_leave_every_body_that_they_enter() {
     let gpu = Gpu::open();
-    // Bodies of index 1 between a floor and a lamp: they reflect nothing, and light is absorbed on its way in them alone.
+    // Bodies of index 1 between a floor and a lamp: they reflect nothing, and absorb light on its way in them.
     let lamp = DVec3::new(0.4, 0.2, 4.0);
     let colors = [[0.3_f32, 0.6, 0.9], [0.8, 0.5, 0.4]];
     for gap in [0.0, 0.5] {

@@ -521,8 +521,8 @@ impl Device {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let semaphore = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        // SAFETY: the queue family was requested above; the create infos outlive the calls. Where one object is missing,
-        // the others are destroyed, and then the device.
+        // SAFETY: the queue family was requested above; the create infos outlive the calls. Where one object is
+        // missing, the others are destroyed, and then the device.
         let (queue, allocator, commands, timeline) = unsafe {
             let (queue, commands) = (raw.get_device_queue(family, 0), raw.create_command_pool(&pool, None));
             let timeline = raw.create_semaphore(&semaphore, None);
