@@ -89,7 +89,7 @@ impl Measuring<'_> {
         let begun = Instant::now();
         let drawn = self.bench.warm_up(&task.knobs).and_then(|mut warm| {
             // The estimate was a guess; the warm-up has measured.
-            if self.pace.lacks(warm.sample_s * f64::from(task.knobs.samples.count())) {
+            if self.pace.too_long(warm.sample_s * f64::from(task.knobs.samples.count())) {
                 return Ok(None);
             }
             let measured = self.bench.measure(&mut warm, Some((&mut base.warm, &base.measured)), self.enough_ms)?;

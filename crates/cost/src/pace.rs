@@ -119,11 +119,11 @@ impl<'a> Pace<'a> {
 
     /// Whether there is no time for a picture of so many estimated seconds; the picture is then counted as left out.
     pub fn too_late(&mut self, expected: f64) -> bool {
-        self.lacks(self.forecast.as_it_went(expected))
+        self.too_long(self.forecast.as_it_went(expected))
     }
 
     /// The same for measured seconds.
-    pub fn lacks(&mut self, seconds: f64) -> bool {
+    pub fn too_long(&mut self, seconds: f64) -> bool {
         let late = (self.stopped)() || self.ends && seconds + self.judged_s + self.reserved_s > self.left_s();
         if late {
             self.left_out += 1;
