@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 
 use super::sigma_grid::SigmaGrids;
 use super::spectrum::{SpectrumConstants, SpectrumOnDevice};
-use super::table::{check_bound, upload};
+use super::table::upload;
 use super::texture::{SLOTS, Textures, texture_slots};
 use super::view::View;
 use crate::gpu::{
@@ -257,7 +257,7 @@ impl SceneOnDevice {
         let lights_cpu = std::mem::take(&mut scene.lights);
 
         let instance_bytes = (scene.instances.len() * size_of::<share::Instance>()) as u64;
-        check_bound(device, "instances", instance_bytes)?;
+        device.check_bound("instances", instance_bytes)?;
         let map_texels = if plan.shadow_maps { 6 * lib::light_table::SHADOW_MAP_TEXELS as usize } else { 0 };
         let light_bytes = (lights_cpu.len() * (LIGHT_TEXELS + map_texels) * 16) as u64;
         let media = solids.medium.clone();

@@ -2,24 +2,15 @@
 
 use std::sync::Arc;
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use ash::vk;
 use half::f16;
 
-use crate::gpu::{Buffer, Device, Frame, Place, TooLarge};
+use crate::gpu::{Buffer, Device, Frame, Place};
 
 /// Two half floats in one word, the inverse of GLSL's `unpackHalf2x16`.
 pub(super) fn pack_half_2x16([x, y]: [f16; 2]) -> u32 {
     u32::from(x.to_bits()) | u32::from(y.to_bits()) << 16
-}
-
-/// Refuses a buffer that shaders cannot bind whole.
-pub(super) fn check_bound(device: &Device, name: &str, bytes: u64) -> Result<()> {
-    if bytes > device.max_storage_bytes() {
-        let limit = format!("binds at most {} bytes of one", device.max_storage_bytes());
-        bail!(TooLarge { what: format!("creating buffer \"{name}\" of {bytes} bytes"), limit });
-    }
-    Ok(())
 }
 
 /// A buffer with `data` in the device's fastest memory: written directly on a CPU device, through a staging buffer on
@@ -37,7 +28,7 @@ pub fn upload<T: bytemuck::NoUninit>(
     let place = if device.info().kind == "cpu" { Place::Upload } else { Place::Device };
     let size = bytes.len() as u64;
     if texels.is_none() {
-        check_bound(device, name, size)?;
+        device.check_bound(name, size)?;
     }
     let mut buffer = match texels {
         Some(format) => Buffer::texels(device, name, size, place, format)?,

@@ -82,6 +82,21 @@ fn prefer_large_pages(allocation: &Allocation) {
     };
 }
 
+impl Device {
+    /// Refuses a buffer that shaders cannot bind whole.
+    ///
+    /// # Errors
+    /// [`TooLarge`].
+    pub fn check_bound(&self, name: &str, bytes: u64) -> Result<()> {
+        let most = self.max_storage_bytes();
+        if bytes > most {
+            let what = format!("creating buffer \"{name}\" of {bytes} bytes");
+            bail!(TooLarge { what, limit: format!("binds at most {most} bytes of one") });
+        }
+        Ok(())
+    }
+}
+
 impl Buffer {
     /// A buffer of `bytes` bytes with every usage of a shader or copy. A buffer of 0 bytes is a dummy to bind where no
     /// shader reads, and is named [`NOTHING`].
@@ -118,9 +133,8 @@ impl Buffer {
             Some(_) => !device.offers().texel_buffers,
             None => matches!(place, Place::Device | Place::Counters),
         };
-        if is_bound && bytes > device.max_storage_bytes() {
-            let limit = format!("binds at most {} bytes of one", device.max_storage_bytes());
-            bail!(TooLarge { what: creating(), limit });
+        if is_bound {
+            device.check_bound(name, bytes)?;
         }
         let texels = texels.filter(|_| device.offers().texel_buffers);
         let most = u64::from(device.limits.max_texel_buffer_elements);
