@@ -41,6 +41,7 @@ struct LightSample {
     vec3 arriving; // radiance over density; of punctual lights irradiance perpendicular to to_light over probability
     float pdf;     // per solid angle; 0 for punctual (delta) lights, which BSDF sampling cannot hit
 };
+const LightSample NO_LIGHT_SAMPLE = LightSample(vec3(0.0), -1.0, vec3(0.0), 0.0);
 
 // Position of a word inside its bin [first, next), in [0, 1): a new uniform number. A bin of size 0 is the only one and
 // spans all words.

@@ -78,14 +78,18 @@ float depth_round_trip(float z, float near, float far) {
     return z_back;
 }
 
+float linear_channel(float x) {
+    float t = (x + 0.055) / 1.055;
+    float q = sqrt(sqrt(t));
+    float p = (((4.466797411e-2 * q - 0.231552169) * q + 0.908784986) * q + 0.298558623) * q - 2.045780234e-2;
+    return x <= 0.04045 ? x / 12.92 : t * t * p;
+}
+
 // @eq N45: sRGB to linear by IEC 61966-2-1, of bytes
 // @out linear
 // x^2.4 as x² P(⁴√x), with a relative error of 2.1e-6. Rays decode single texels with it, as a texture unit does in hardware.
 vec3 linear_from_srgb(vec3 x) {
-    vec3 t = (x + 0.055) / 1.055;
-    vec3 q = sqrt(sqrt(t));
-    vec3 p = (((4.466797411e-2 * q - 0.231552169) * q + 0.908784986) * q + 0.298558623) * q - 2.045780234e-2;
-    return mix(t * t * p, x / 12.92, lessThanEqual(x, vec3(0.04045)));
+    return vec3(linear_channel(x.r), linear_channel(x.g), linear_channel(x.b));
 }
 
 // @eq N10: u = 1/2 + φ/2π, v = 1/2 − elevation/π; φ = atan2(d_z, d_x), elevation = atan2(d_y, √(d_x² + d_z²))

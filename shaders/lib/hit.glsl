@@ -43,9 +43,15 @@ int wrapped(int i, int size, uint mode) {
     return mode == 2 ? clamp(i, 0, size - 1) : clamp(mode == 1 ? mirrored : repeated, 0, size - 1);
 }
 
-vec4 texel_at(uint first, ivec2 size, int x, int y, uint flags) {
-    vec4 value = unpackUnorm4x8(imageLoad(texels, int(first) + y * size.x + x).x);
-    return (flags & TEXELS_SRGB) != 0 ? vec4(linear_from_srgb(value.rgb), value.a) : value;
+// Two neighbouring texels along one axis.
+ivec2 two_wrapped(int i, int size, uint mode) {
+    return ivec2(wrapped(i, size, mode), wrapped(i + 1, size, mode));
+}
+
+// One of the channels of four texels, between them by `share`: the texels at low x and high x, first of low y, then of high y.
+float between_texels(vec4 of_texels, vec2 share, bool srgb) {
+    if (srgb) of_texels = vec4(linear_from_srgb(of_texels.xyz), linear_from_srgb(of_texels.www).x);
+    return mix(mix(of_texels.x, of_texels.y, share.x), mix(of_texels.z, of_texels.w, share.x), share.y);
 }
 
 // A texture of a material at uv, bilinear within one mip level: the one whose texels are `footprint` wide in units of uv.
@@ -74,12 +80,16 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     at = clamp(at, -1e9, 1e9);
     ivec2 corner = ivec2(floor(at));
     vec2 share = nearest ? vec2(0.0) : at - floor(at);
-    uvec2 modes = uvec2(flags >> 2, flags >> 4) & 3u;
-    ivec2 low = ivec2(wrapped(corner.x, size.x, modes.x), wrapped(corner.y, size.y, modes.y));
-    ivec2 high = ivec2(wrapped(corner.x + 1, size.x, modes.x), wrapped(corner.y + 1, size.y, modes.y));
-    vec4 top = mix(texel_at(first, size, low.x, low.y, flags), texel_at(first, size, high.x, low.y, flags), share.x);
-    vec4 bottom = mix(texel_at(first, size, low.x, high.y, flags), texel_at(first, size, high.x, high.y, flags), share.x);
-    return mix(top, bottom, share.y);
+    ivec2 rows = int(first) + two_wrapped(corner.y, size.y, flags >> 4 & 3u) * size.x;
+    ivec2 columns = two_wrapped(corner.x, size.x, flags >> 2 & 3u);
+    vec4 a = unpackUnorm4x8(imageLoad(texels, rows.x + columns.x).x);
+    vec4 b = unpackUnorm4x8(imageLoad(texels, rows.x + columns.y).x);
+    vec4 c = unpackUnorm4x8(imageLoad(texels, rows.y + columns.x).x);
+    vec4 d = unpackUnorm4x8(imageLoad(texels, rows.y + columns.y).x);
+    // Channel by channel: the four texels wait as words, a register each. Texel by texel, ten more registers were live (RADV).
+    bool srgb = (flags & TEXELS_SRGB) != 0;
+    return vec4(between_texels(vec4(a.r, b.r, c.r, d.r), share, srgb), between_texels(vec4(a.g, b.g, c.g, d.g), share, srgb),
+                between_texels(vec4(a.b, b.b, c.b, d.b), share, srgb), between_texels(vec4(a.a, b.a, c.a, d.a), share, false));
 }
 
 bool has_hit_texture(uint material, uint slot) {

@@ -139,7 +139,7 @@ Hit tree_hit() {
     return Hit(uintBitsToFloat(a.x), a.y, uintBitsToFloat(a.z), uintBitsToFloat(a.w));
 }
 
-LightSample tree_light() {
+LightSample drawn_apart() {
     uvec4 a = trees[tree_word(TREE_LIGHT)];
     uvec4 b = trees[tree_word(TREE_LIGHT + 1)];
     return LightSample(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz), uintBitsToFloat(b.w));

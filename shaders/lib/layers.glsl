@@ -15,6 +15,7 @@
 #define LAYERS_GLSL
 #include "lib/anisotropy.glsl"
 #include "lib/brdf.glsl"
+#include "lib/loops.glsl"
 #include "lib/random.glsl"
 #include "lib/reflectance.glsl"
 #include "lib/sheen.glsl"
@@ -93,12 +94,14 @@ struct BaseFresnel {
 };
 
 BaseFresnel fresnel_of_base(Surface s, float cos_in) {
-    BaseFresnel f = BaseFresnel(fresnel_of_dielectric(s, cos_in), fresnel_of_metal(s, cos_in));
-    if (IRIDESCENCE) {
-        Film film = film_of(s, cos_in, s.n_outside);
-        f = BaseFresnel(under_film(s, film, f.dielectric, s.ior, nested_f0(s.n_outside, s.ior)), metal_under_film(s, film, f.metal));
-    }
-    return f;
+    // The film first: nothing else waits in registers meanwhile.
+    Film film;
+    if (IRIDESCENCE) film = film_of(s, cos_in, s.n_outside);
+    vec3 dielectric = fresnel_of_dielectric(s, cos_in);
+    if (IRIDESCENCE) dielectric = under_film(s, film, dielectric, s.ior, nested_f0(s.n_outside, s.ior));
+    vec3 metal = fresnel_of_metal(s, cos_in);
+    if (IRIDESCENCE) metal = metal_under_film(s, film, metal);
+    return BaseFresnel(dielectric, metal);
 }
 
 // Fresnel reflectance of the clear coat, of index COAT_INDEX. Schlick's curve keeps its F0 (KHR_materials_clearcoat) in
@@ -297,6 +300,15 @@ struct Layers {
     vec4 shares;       // selection probabilities of coat, base, diffuse base layer, transmission for paths; their sum is 1, or 0
 };
 
+// The layers in one turn of a loop over lights: numbers that follow from F0 alone are computed in it, and take no registers
+// while shadow rays are traced.
+Layers in_turn(Layers b, uint of_turn) {
+    b.s.f0_dielectric = found_anew(b.s.f0_dielectric, of_turn);
+    b.s.f0_metal = found_anew(b.s.f0_metal, of_turn);
+    b.s.metallic = found_anew(b.s.metallic, of_turn);
+    return b;
+}
+
 // Fresnel reflectance of the base at an angle.
 struct FacetFresnel {
     vec3 dielectric;
@@ -316,21 +328,23 @@ void between_media(inout vec3 f0, inout float f90, float ior, float n1, float n2
 FacetFresnel fresnel_below_coat(Layers b, float cos_in) {
     Surface s = b.s;
     FacetFresnel f;
+    // The film first, as in fresnel_of_base.
+    Film film;
+    if (IRIDESCENCE) film = film_of(s, cos_in, b.n1);
     float share = b.between || FRESNEL == FRESNEL_EXACT ? boundary_share(cos_in, b.n1, b.n2) : schlick_weight(cos_in);
     vec3 f0 = s.f0_dielectric;
     float f90 = s.f90_dielectric;
     if (b.solid) between_media(f0, f90, s.ior, b.n1, b.n2);
     f.total = b.solid && share >= 1.0;
     f.dielectric = f0 + (vec3(f90) - f0) * share;
-    vec3 metal = fresnel_of_metal(s, cos_in);
     if (IRIDESCENCE) {
-        Film film = film_of(s, cos_in, b.n1);
         // Of a closed dielectric mesh f0_dielectric is that in air.
         float r0 = nested_f0(b.solid ? 1.0 : b.n1, s.ior);
         f.dielectric = under_film(s, film, f.dielectric, b.n2, r0);
-        metal = metal_under_film(s, film, metal);
     }
     f.dielectric = f.total ? vec3(1.0) : f.dielectric;
+    vec3 metal = fresnel_of_metal(s, cos_in);
+    if (IRIDESCENCE) metal = metal_under_film(s, film, metal);
     f.base = blend(f.dielectric, metal, s.metallic);
     return f;
 }

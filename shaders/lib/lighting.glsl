@@ -42,8 +42,12 @@ LightSample light_sample(vec3 origin, uvec2 pixel, uint surface, uint i) {
     return sample_emitter(origin, choose_emitter(origin, words.x), words.y);
 }
 
-layout(constant) const bool SAMPLED_APART = false; // another kernel has drawn the first light sample
-LightSample drawn_apart = LightSample(vec3(0.0), -1.0, vec3(0.0), 0.0);
+layout(constant) const bool SAMPLED_APART = false; // another kernel has drawn the first light sample of the surface
+// Reads it where it is needed: no register holds it while rays are traced.
+LightSample drawn_apart();
+
+// The surfaces are hits of rays: p_rel and p_bvh are the same point.
+layout(constant) const bool LIT_AT_HITS = false;
 
 // The layers without the lobes that find emissive surfaces themselves, by a ray or in the picture.
 Layers without_mirrors(Layers b, uint surface) {
@@ -63,11 +67,14 @@ Layers without_mirrors(Layers b, uint surface) {
 // Radiance that light `index` of the table adds, with its shadow; where `is_sample`, that of a light sample.
 vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     Surface s = b.s;
-    PunctualLight light = punctual_light_at(is_sample ? 0u : index, s.p_rel);
+    vec3 p_rel = LIT_AT_HITS ? s.p_bvh - trace_terms.bvh_from_rel : s.p_rel;
+    PunctualLight light = punctual_light_at(is_sample ? 0u : index, p_rel);
     if (LIGHT_SAMPLES > 0) {
         if (is_sample) {
-            LightSample drawn = drawn_apart;
-            if (!SAMPLED_APART || (LIGHT_SAMPLES > 1 && index > 0)) {
+            LightSample drawn;
+            if (SAMPLED_APART && (LIGHT_SAMPLES == 1 || index == 0)) {
+                drawn = drawn_apart();
+            } else {
                 drawn = light_sample(ray_origin(s.p_bvh, s.n_triangle, s.v), pixel, surface, index);
             }
             // Samples without light are evaluated as well: with a selection here the plans of a scene and of everything
@@ -93,12 +100,12 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
         result *= terminator(s.n, s.n_triangle, light.l);
         bool wanted = largest(result) > FAINTEST_LOBE * largest(light.arriving);
         if (SHADOWS == SHADOW_MAP && !(LIGHT_SAMPLES > 0 && is_sample)) {
-            float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(s.p_rel));
+            float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(p_rel));
             return wanted ? result * share : vec3(0.0);
         }
         // From p_bvh, the point on the triangle: p_rel may come from depth (lib/primary.glsl).
         vec3 to_light = light.to_light;
-        if (!light.directional && !is_sample) to_light += s.p_rel - (s.p_bvh - trace_terms.bvh_from_rel);
+        if (!LIT_AT_HITS && !light.directional && !is_sample) to_light += p_rel - (s.p_bvh - trace_terms.bvh_from_rel);
         result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, to_light, light.directional ? LARGEST : 1.0, wanted);
     }
     return result;
@@ -113,6 +120,15 @@ struct LightRange {
     uint end_word;
 };
 
+// The light of a surface waits in shared memory while shadow rays are traced, where the traversal has its stack there as well.
+const bool LIGHT_WAITS = TRAVERSAL == STACK;
+shared vec3 light_waiting[LIGHT_WAITS ? 2u * TRACING_LANES : 1u];
+
+// Word of light that waits: 0 from the lights so far, 1 from around.
+uint waiting_word(uint of, uint of_turn) {
+    return of * TRACING_LANES + found_anew(gl_LocalInvocationIndex, of_turn);
+}
+
 // Loop iterations after which no further light is started.
 layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 
@@ -123,6 +139,7 @@ uint samples_cut_off = 0;
 vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
     if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
+    if (LIGHT_WAITS) light_waiting[waiting_word(0, 0)] = sum;
     // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
     // the body of a loop at least once, and the body for a light is long.
     int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
@@ -147,9 +164,15 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
         uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : in_group;
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;
-        sum += light_on(b, index, is_sample, uvec2(pixel), surface);
+        b = in_turn(b, index);
+        vec3 light = light_on(b, index, is_sample, uvec2(pixel), surface);
+        if (LIGHT_WAITS) {
+            light_waiting[waiting_word(0, index)] += light;
+        } else {
+            sum += light;
+        }
     }
-    return sum;
+    return LIGHT_WAITS ? light_waiting[waiting_word(0, next)] : sum;
 }
 
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
@@ -159,7 +182,9 @@ vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, Li
     // Before the lights: afterwards the albedos would take registers while shadow rays are traced.
     vec3 around = s.emissive * under_coat(s);
     if (AMBIENT || REFLECTION) around += environment_light(s, albedo);
+    if (LIGHT_WAITS) light_waiting[waiting_word(1, 0)] = around;
     vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
+    if (LIGHT_WAITS) around = light_waiting[waiting_word(1, shadow_rays)];
     result += all_around ? around : vec3(0.0);
     return s.unlit ? all_around ? s.base : vec3(0.0) : result;
 }

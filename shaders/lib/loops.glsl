@@ -1,4 +1,5 @@
-// A limit on loop iterations: lavapipe ends all loops of an invocation silently after 65,535 of them.
+// Loops: a limit on their iterations, for lavapipe ends all loops of an invocation silently after 65,535 of them; and what is
+// computed in each turn.
 // Where to read: docs/decisions/lavapipe.md.
 #ifndef LOOPS_GLSL
 #define LOOPS_GLSL
@@ -10,4 +11,18 @@ shared uint loop_iterations;
 // Loop iterations that one invocation may use. Eight pixels share the 65,535, and in every loop the longest of them counts:
 // 40,000 of its own leave room for the others.
 layout(constant) const uint LOOP_BUDGET = 40000;
+
+// x, where `of_turn` is below 2^31 and is known only within a turn of a loop. A compiler does not know that it is below, so it
+// computes in each turn what follows from x, instead of once before the loop. Until a turn needs it, no register holds it.
+uint found_anew(uint x, uint of_turn) {
+    return x ^ (of_turn >> 31);
+}
+
+float found_anew(float x, uint of_turn) {
+    return uintBitsToFloat(floatBitsToUint(x) ^ (of_turn >> 31));
+}
+
+vec3 found_anew(vec3 x, uint of_turn) {
+    return uintBitsToFloat(floatBitsToUint(x) ^ (of_turn >> 31));
+}
 #endif

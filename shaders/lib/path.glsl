@@ -157,12 +157,39 @@ PhotonSample draw_photon(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted) {
 float emission_weight(Path p, Hit found, vec3 n);
 LightSample first_light(Path p, vec3 origin, uvec2 pixel);
 PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted);
+// p.media: kept by the program, or read again from memory, so that no registers hold it while the BSDF is evaluated.
+uvec4 media_before(Path p);
+
+// What a path knows of a vertex waits in shared memory while the BSDF is evaluated, where the traversal has its stack there.
+const bool PATH_WAITS = TRAVERSAL == STACK;
+const uint WAITING_THROUGHPUT = 0;
+const uint WAITING_ARRIVING = 1; // of the light sample
+const uint WAITING_WEIGHT = 2;   // of the BSDF sample
+const uint WAITING_GATHERED = 3;
+shared vec3 path_waiting[PATH_WAITS ? 4u * TRACING_LANES : 1u];
+
+uint waiting_word(uint of, uint of_turn) {
+    return of * TRACING_LANES + found_anew(gl_LocalInvocationIndex, of_turn);
+}
+
+// What waits, where it does; otherwise `kept`.
+vec3 waited(uint of, uint of_turn, vec3 kept) {
+    return PATH_WAITS ? path_waiting[waiting_word(of, of_turn)] : kept;
+}
+
+void gather(inout vec3 gathered, vec3 light, uint of_turn) {
+    if (PATH_WAITS) {
+        path_waiting[waiting_word(WAITING_GATHERED, of_turn)] += light;
+    } else {
+        gathered += light;
+    }
+}
 
 // Shades one path vertex. Returns the radiance gathered there; also gives the shadow ray still to be traced, and the
 // continued path p.
-// Steps: 1. the vertex; 2. next event estimation; light found by the path itself: 3a. the environment, 3b. emission
-// of the surface; 4. the BSDF sample, and the BSDF towards all light samples, a photon, and along the path, in one loop;
-// 5. further light samples, in that loop; 6. the continued path; 7. Russian roulette.
+// Steps: 1. the vertex; 2. the BSDF sample; 3. next event estimation; light found by the path itself: 4a. the environment, 4b.
+// emission of the surface; 5. the BSDF towards all light samples, a photon, and along the path, in one loop; 6. further
+// light samples, in that loop; 7. the continued path; 8. Russian roulette.
 vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRay shadow_ray) {
     // 1. The vertex: absorption on the way, hit, boundary, BSDF.
     shadow_ray = ShadowRay(p.origin, vec3(0.0, 1.0, 0.0), -1.0, p.source_face, p.media, vec3(0.0));
@@ -177,12 +204,16 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     if (PATH_GUIDING) enable_guiding(vertex.bsdf);
     Layers b = vertex.bsdf.layers;
 
-    // 2. Next event estimation: a light sample.
+    // 2. The BSDF sample that continues the path. Before the light sample, which would wait in registers.
+    uvec2 words = dimension_words(pixel, vertices_before, DIMENSION_DIRECTION);
+    BsdfSample drawn = bsdf_sample(vertex.bsdf, vertex.x, vec2(unit_float(words.x), unit_float(words.y)));
+
+    // 3. Next event estimation: a light sample.
     LightSample light = LightSample(p.direction, -1.0, vec3(0.0), 0.0);
     bool scatters = at_surface && !passed_by && !hit.s.unlit && (!b.delta || b.shares.z > 0.0 || (CLEARCOAT && !b.coat_delta));
     vec3 front_origin = ray_origin(hit.s.p_bvh, hit.n, hit.s.v);
     if (EMITTERS > 0) light = first_light(p, front_origin, pixel);
-    // 3a. Light found by the path itself: the environment, weighted by the power heuristic.
+    // 4a. Light found by the path itself: the environment, weighted by the power heuristic.
     if (ENVIRONMENT) {
         vec3 towards = at_surface ? light.to_light : p.direction;
         vec3 seen = environment_radiance(towards);
@@ -198,7 +229,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     float background_share = mean(p.throughput);
     bool escaped = !at_surface && !SKY && (p.state & PATH_TRANSPARENT_SO_FAR) != 0;
 
-    // 3b. Light found by the path itself: emission of the surface, weighted by the power heuristic.
+    // 4b. Light found by the path itself: emission of the surface, weighted by the power heuristic.
     if (at_surface && !passed_by) {
         vec3 emits = hit.s.unlit ? hit.s.base : hit.s.emissive * under_coat(hit.s);
         // Single-sided surfaces emit on their front alone.
@@ -209,15 +240,13 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
         ends = ends || hit.s.unlit;
     }
 
-    // 4. The BSDF sample that continues the path, and BSDF and density for both strategies.
+    // 5. BSDF and density for both strategies.
     uint vertices = vertices_before + 1;
     if (!ends && vertices > trace_terms.interfaces) {
         lost += largest(p.throughput);
         most_lost = max(most_lost, largest(p.throughput));
         ends = true;
     }
-    uvec2 words = dimension_words(pixel, vertices_before, DIMENSION_DIRECTION);
-    BsdfSample drawn = bsdf_sample(vertex.bsdf, vertex.x, vec2(unit_float(words.x), unit_float(words.y)));
     PhotonSample photon = PhotonSample(0u, vec3(0.0));
     if (PHOTON_MAP) photon = photon_near(p, hit.s.p_bvh, hit.n, pixel, scatters && alive);
     // First towards the light samples, then to a photon, at last along the path, in a loop: the code exists once.
@@ -225,11 +254,19 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
     LightSample sampled = light;
     uint last = LIGHT_SAMPLES + (PHOTON_MAP ? 1u : 0u);
+    if (PATH_WAITS) {
+        path_waiting[waiting_word(WAITING_THROUGHPUT, 0)] = p.throughput;
+        path_waiting[waiting_word(WAITING_ARRIVING, 0)] = light.arriving;
+        path_waiting[waiting_word(WAITING_WEIGHT, 0)] = drawn.weight;
+        path_waiting[waiting_word(WAITING_GATHERED, 0)] = gathered;
+    }
+    Bsdf bsdf = vertex.bsdf;
     for (uint i = 0; i <= last; i++) {
+        bsdf.layers = in_turn(bsdf.layers, i);
         bool further = EMITTERS > 0 && LIGHT_SAMPLES > 1 && i > 0 && i < LIGHT_SAMPLES;
-        vec3 towards = i == last ? drawn.direction : normalize(sampled.to_light);
+        vec3 towards = i == last ? drawn.direction : normalize(found_anew(sampled.to_light, i));
         if (further) {
-            // 5. A further light sample; its shadow ray is traced below.
+            // 6. A further light sample; its shadow ray is traced below.
             sampled = sample_light(front_origin, dimension_words_of(pixel, vertices_before, DIMENSION_LIGHT, i, LIGHT_SAMPLES));
             if (SAMPLED_ENVIRONMENT && sampled.pdf > 0.0 && sampled.t_max == LARGEST) {
                 bool ahead = OTHER_BACKGROUND && (p.state & PATH_TRANSPARENT_SO_FAR) != 0 && dot(hit.n, sampled.to_light) < 0.0 && !shines_through(b);
@@ -238,23 +275,35 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
             towards = normalize(sampled.to_light);
         }
         if (PHOTON_MAP && i == LIGHT_SAMPLES) towards = to_light_of(photon);
-        PathEval now = bsdf_evaluate(vertex.bsdf, towards);
+        PathEval now = bsdf_evaluate(bsdf, towards);
         if (i == 0) towards_light = now;
         on_path = now;
-        if (PHOTON_MAP && i == LIGHT_SAMPLES && largest(photon.arriving) > 0.0) gathered += p.throughput * now.f_cos * photon.arriving;
+        if (PHOTON_MAP && i == LIGHT_SAMPLES && largest(photon.arriving) > 0.0) {
+            gather(gathered, waited(WAITING_THROUGHPUT, i, p.throughput) * now.f_cos * photon.arriving, i);
+        }
         if (further) {
-            ShadowRay one = shadow_ray_to(p, interaction, scatters, front_origin, sampled, now);
+            Path at_vertex = p;
+            at_vertex.throughput = waited(WAITING_THROUGHPUT, i, p.throughput);
+            ShadowRay one = shadow_ray_to(at_vertex, interaction, scatters, front_origin, sampled, now);
             one.t_max = alive ? one.t_max : -1.0;
             shadow_rays += one.t_max > 0.0 ? 1u : 0u;
             vec3 arrives = arriving(one);
-            if (one.t_max > 0.0) gathered += finite_or_zero(one.contribution, pixel, hit.material, vertices_before) * arrives;
+            if (one.t_max > 0.0) gather(gathered, finite_or_zero(one.contribution, pixel, hit.material, vertices_before) * arrives, i);
         }
     }
+    // What no register has held through the loop.
+    uint of_turn = trace_terms.sample_index;
+    p.throughput = waited(WAITING_THROUGHPUT, of_turn, p.throughput);
+    light.arriving = waited(WAITING_ARRIVING, of_turn, light.arriving);
+    drawn.weight = waited(WAITING_WEIGHT, of_turn, drawn.weight);
+    gathered = waited(WAITING_GATHERED, of_turn, gathered);
+    p.media = media_before(p);
+    front_origin = ray_origin(found_anew(hit.s.p_bvh, of_turn), hit.n, hit.s.v);
     if (EMITTERS > 0) {
         // The first sample's shadow ray is traced by the caller.
         shadow_ray = shadow_ray_to(p, interaction, scatters, front_origin, light, towards_light);
     }
-    // 6. The continued path: throughput, start of the next ray, media.
+    // 7. The continued path: throughput, start of the next ray, media.
     vec3 weight = drawn.delta ? drawn.weight : on_path.pdf > 0.0 ? on_path.f_cos / on_path.pdf : vec3(0.0);
     bool unscattered = is_unscattered(vertex, drawn);
     bool behind = passed_by || drawn.through;
@@ -268,7 +317,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     flags &= behind && (passed_by || drawn.delta || !shines_through(b)) ? ~0u : ~PATH_TRANSPARENT_SO_FAR;
     flags &= passed_by || drawn.straight ? ~0u : ~PATH_UNSCATTERED;
     flags |= !passed_by && !drawn.delta ? PATH_NON_SPECULAR : 0u;
-    // 7. Russian roulette uses the throughput that the path would have without path guiding. Guiding lowers the throughput
+    // 8. Russian roulette uses the throughput that the path would have without path guiding. Guiding lowers the throughput
     //    of guided paths; terminating those more often would undo it.
     float most = largest(p.throughput);
     if (PATH_GUIDING) {

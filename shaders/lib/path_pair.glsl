@@ -13,6 +13,10 @@ LightSample first_light(Path p, vec3 origin, uvec2 pixel) {
     return draw_first_light(p, origin, pixel);
 }
 
+uvec4 media_before(Path p) {
+    return p.media;
+}
+
 PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted) {
     return draw_photon(p, p_bvh, n, pixel, wanted);
 }

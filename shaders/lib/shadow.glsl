@@ -178,6 +178,10 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_l
     bool goes_on = wanted;
     do {
         Filters filters;
+        // What a traversal makes of its ray is not kept for the next one: AMD's compiler would hold some 25 registers while
+        // filters are evaluated.
+        origin = found_anew(origin, floatBitsToUint(last.t));
+        to_light = found_anew(to_light, floatBitsToUint(last.t));
         bool blocked = trace_to_light(origin, to_light, source_face, last, goes_on ? end : -1.0, filters);
         through = blocked ? vec3(0.0) : through;
         goes_on = goes_on && !blocked && filters.triangles.w != NO_TRIANGLE;

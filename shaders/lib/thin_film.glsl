@@ -33,11 +33,11 @@ float film_reflectance(float a, float rho, float cos_phi) {
 // Gaussians over 1/λ (Belcour and Barla 2017), so the mean has a closed form.
 vec3 film_sensitivity(float path) {
     float micrometres = path * 1e-3;
-    vec4 turns = vec4(1.6810, 1.7953, 2.2084, 2.2399) * micrometres;
-    vec4 waves;
-    for (int i = 0; i < 4; i++) waves[i] = cos_of_turns(turns[i]);
+    const vec4 TURNS = vec4(1.6810, 1.7953, 2.2084, 2.2399);
+    const vec4 DECAYS = vec4(-4.3278e-3, -9.3046e-3, -6.6121e-3, -4.5282e-3);
     float k = 2.0 * PI * micrometres;
-    vec4 gaussians = waves * exp(vec4(-4.3278e-3, -9.3046e-3, -6.6121e-3, -4.5282e-3) * (k * k));
+    vec4 gaussians;
+    for (int i = 0; i < 4; i++) gaussians[i] = cos_of_turns(TURNS[i] * micrometres) * exp(DECAYS[i] * (k * k));
     // X has two, weighted by their areas.
     vec3 xyz = vec3(0.846202 * gaussians.x + 0.153798 * gaussians.w, gaussians.yz);
     // Equal X, Y and Z are not white in Rec. 709: each channel is divided by its value for them.
@@ -81,19 +81,24 @@ Film film_at(float cos_in, float n1, float n, float thickness) {
     return film;
 }
 
-// Reflectance for one polarisation, with the amplitude ρ of the inner face.
-vec3 film_in_channels(Film film, float a, vec3 rho) {
-    vec3 q = -a * rho;
-    vec3 sum = vec3(1.0) + 2.0 * q * (film.cos_phi + q * (film.cos_2_phi + q * film.cos_3_phi));
-    vec3 series = clamp(1.0 - (1.0 - a * a) * (1.0 - rho * rho) / (1.0 - q * q) * sum, 0.0, 1.0);
-    return SPECTRAL ? vec3(film_reflectance(a, rho.x, film.cos_phi.x)) : series;
+// Reflectance in a channel, for one polarisation, with the amplitude ρ of the inner face.
+float film_in_channel(Film film, float a, float rho, int channel) {
+    float q = -a * rho;
+    float sum = 1.0 + 2.0 * q * (film.cos_phi[channel] + q * (film.cos_2_phi[channel] + q * film.cos_3_phi[channel]));
+    float series = clamp(1.0 - (1.0 - a * a) * (1.0 - rho * rho) / (1.0 - q * q) * sum, 0.0, 1.0);
+    return SPECTRAL ? film_reflectance(a, rho, film.cos_phi.x) : series;
+}
+
+// Mean of both polarisations.
+float film_unpolarised(Film film, vec2 rho, int channel) {
+    return 0.5 * (film_in_channel(film, film.outer.x, rho.x, channel) + film_in_channel(film, film.outer.y, rho.y, channel));
 }
 
 // Reflectance of the film over a dielectric of index n2, unpolarised.
 vec3 film_over_dielectric(Film film, float n2) {
     float cos_behind = sqrt(max(1.0 - film.sin2 / (n2 * n2), 0.0));
     vec2 rho = interface_amplitudes(film.cos_film, cos_behind, film.n, n2);
-    vec3 f = 0.5 * (film_in_channels(film, film.outer.x, vec3(rho.x)) + film_in_channels(film, film.outer.y, vec3(rho.y)));
+    vec3 f = vec3(film_unpolarised(film, rho, 0), film_unpolarised(film, rho, 1), film_unpolarised(film, rho, 2));
     return film.total ? vec3(1.0) : f;
 }
 
@@ -101,7 +106,8 @@ vec3 film_over_dielectric(Film film, float n2) {
 // denser medium.
 vec3 film_over_metal(Film film, vec3 metal) {
     vec3 rho = sqrt(clamp(metal, 0.0, 1.0));
-    vec3 f = 0.5 * (film_in_channels(film, film.outer.x, -rho) + film_in_channels(film, film.outer.y, rho));
+    vec3 f = vec3(film_unpolarised(film, vec2(-rho.x, rho.x), 0), film_unpolarised(film, vec2(-rho.y, rho.y), 1),
+                  film_unpolarised(film, vec2(-rho.z, rho.z), 2));
     return film.total ? vec3(1.0) : f;
 }
 #endif

@@ -126,11 +126,17 @@ void visit(inout Traversal w, BoxRay r, float t_min) {
 // A ray prepared for watertight ray/triangle intersection.
 struct TriangleRay {
     vec3 origin;
-    Shear shear;
+    ShearTerms terms;
+    Shear shear;         // of the terms; a traversal with a stack does without
     float after;         // hits at this t or before do not count,
     uint after_triangle; // except those of later triangles at the same t
     uint source_face;           // coplanar group that the ray leaves, which it cannot hit again
 };
+
+TriangleRay triangle_ray(vec3 origin, vec3 direction, Hit after, uint source_face) {
+    ShearTerms terms = shear_terms(direction);
+    return TriangleRay(origin, terms, shear_of(terms), after.t, after.triangle, source_face);
+}
 
 // The four nearest hits of class FILTER along a shadow ray, in order; LARGEST where there are fewer.
 struct Filters {
@@ -162,13 +168,20 @@ const uint NEAREST = 0;
 const uint ANY = 1;
 const uint TO_LIGHT = 2; // an opaque hit ends it; hits of class FILTER are collected
 
-// Shears a triangle for a ray. A function of its own: glslang does not terminate where a `precise` value comes from a
+// Shears a triangle for a ray. Functions of their own: glslang does not terminate where a `precise` value comes from a
 // member of a value that was fetched at an index depending on itself.
 ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
     precise vec3 a = triangle.a - origin;
     precise vec3 b = triangle.b - origin;
     precise vec3 c = triangle.c - origin;
-    return sheared_triangle(shear, a, b, c);
+    return sheared_triangle(sheared(shear, a), sheared(shear, b), sheared(shear, c));
+}
+
+ShearedTriangle selected_from(BvhTriangle triangle, vec3 origin, ShearTerms terms) {
+    precise vec3 a = triangle.a - origin;
+    precise vec3 b = triangle.b - origin;
+    precise vec3 c = triangle.c - origin;
+    return sheared_triangle(sheared_by_selection(terms, a), sheared_by_selection(terms, b), sheared_by_selection(terms, c));
 }
 
 // Tests one triangle of the stored leaf. The nearest hit counts, and of two at the same t the first triangle. So the result
@@ -179,14 +192,21 @@ void test_triangle(inout Traversal w, inout Filters f, TriangleRay r, BoxRay b, 
     int place = ~w.leaf;
     uint index = uint(pending ? place >> LEAF_BITS : 0);
     BvhTriangle triangle = triangle_at(index);
-    ShearedTriangle s = sheared_from(triangle, r.origin, r.shear);
+    bool counts = pending && (triangle.stops & classes) != 0 && triangle.face != r.source_face;
+    bool filters = (triangle.stops & FILTER) != 0;
+    ShearedTriangle s;
+    if (TRAVERSAL == STACK) {
+        s = selected_from(triangle, r.origin, r.terms);
+    } else {
+        s = sheared_from(triangle, r.origin, r.shear);
+    }
     float inverse = 1.0 / s.det;
-    float t = s.depth * inverse / r.shear.dz;
-    bool hit = pending && s.inside && s.det != 0.0 && (triangle.stops & classes) != 0 && triangle.face != r.source_face;
+    float t = s.depth * inverse / r.terms.dz;
+    bool hit = counts && s.inside && s.det != 0.0;
     hit = hit && (t > r.after || (t == r.after && index > r.after_triangle));
     hit = hit && (t < w.hit.t || (t == w.hit.t && index < w.hit.triangle));
     if (purpose == TO_LIGHT) {
-        bool is_filter = hit && (triangle.stops & FILTER) != 0;
+        bool is_filter = hit && filters;
         insert(f, is_filter ? t : LARGEST, is_filter ? index : NO_TRIANGLE);
         hit = hit && !is_filter;
     }
@@ -316,6 +336,16 @@ int ascend(inout Trail trail, int end) {
     return node;
 }
 
+// Whether a ray meets a box within [t_min, t_max]; it enters the box at `enter`. One box is done before the next one is begun: of both
+// at once, more registers were live (RADV).
+bool enters(BoxRay b, vec3 center, vec3 half_extent, float t_min, float t_max, out float enter) {
+    vec3 t = center * b.inverse;
+    vec3 e = half_extent * b.extent;
+    vec3 near = t + b.start_near - e;
+    enter = max(near.x, max(near.y, near.z));
+    return meets(near, t + b.start_far + e, t_min, t_max);
+}
+
 // Traversal with a short stack, the one of GPUs: both children's boxes are in the parent; the nearer child is next, the
 // other goes onto the stack. Inner nodes, then the triangles of one leaf, with branches: an invocation fetches only what
 // it needs. The stack is in shared memory. As an array of the invocation, Mesa's compiler selects among registers or copies
@@ -334,16 +364,9 @@ Hit traverse_stack(TriangleRay r, vec3 direction, float t_max, uint classes, uin
         while (w.node >= 0 && w.node != b.end) {
             node_visits++;
             StackNode node = stack_node_at(uint(w.node));
-            vec3 tl = node.left_center * b.inverse;
-            vec3 el = node.left_half_extent * b.extent;
-            vec3 tr = node.right_center * b.inverse;
-            vec3 er = node.right_half_extent * b.extent;
-            vec3 near_l = tl + b.start_near - el;
-            vec3 near_r = tr + b.start_near - er;
-            bool hit_l = meets(near_l, tl + b.start_far + el, r.after, w.hit.t);
-            bool hit_r = meets(near_r, tr + b.start_far + er, r.after, w.hit.t);
-            float enter_l = max(near_l.x, max(near_l.y, near_l.z));
-            float enter_r = max(near_r.x, max(near_r.y, near_r.z));
+            float enter_l, enter_r;
+            bool hit_l = enters(b, node.left_center, node.left_half_extent, r.after, w.hit.t, enter_l);
+            bool hit_r = enters(b, node.right_center, node.right_half_extent, r.after, w.hit.t, enter_r);
             if (hit_l || hit_r) {
                 bool right = hit_r && (!hit_l || enter_r < enter_l);
                 descend(trail, right, hit_l && hit_r, right ? node.left : node.right);
@@ -373,14 +396,13 @@ Hit traverse(TriangleRay r, vec3 direction, float t_max, uint classes, uint purp
 // self-intersection: slivers of 7 m were hit again up to 7e-6 m away, and a triangle seen edge-on may be hit at any t.
 Hit trace(vec3 origin, vec3 direction, uint source_face, Hit after, float t_max, uint classes, bool any_hit) {
     Filters none;
-    return traverse(TriangleRay(origin, ray_shear(direction), after.t, after.triangle, source_face), direction, t_max, classes,
-                any_hit ? ANY : NEAREST, none);
+    return traverse(triangle_ray(origin, direction, after, source_face), direction, t_max, classes, any_hit ? ANY : NEAREST, none);
 }
 
 // Shadow ray: whether an opaque triangle occludes it; otherwise the four nearest filters after the hit `after`.
 bool trace_to_light(vec3 origin, vec3 direction, uint source_face, Hit after, float t_max, out Filters filters) {
     filters = NO_FILTERS;
-    TriangleRay r = TriangleRay(origin, ray_shear(direction), after.t, after.triangle, source_face);
+    TriangleRay r = triangle_ray(origin, direction, after, source_face);
     return traverse(r, direction, t_max, OPAQUE | FILTER, TO_LIGHT, filters).triangle != NO_TRIANGLE;
 }
 
@@ -395,8 +417,8 @@ struct PairedRay {
 
 // Traces two rays at once.
 HitPair trace_pair(PairedRay a, PairedRay b, uint classes, bool any_hit) {
-    TriangleRay ra = TriangleRay(a.origin, ray_shear(a.direction), a.after, NO_TRIANGLE, a.source_face);
-    TriangleRay rb = TriangleRay(b.origin, ray_shear(b.direction), b.after, NO_TRIANGLE, b.source_face);
+    TriangleRay ra = triangle_ray(a.origin, a.direction, Hit(a.after, NO_TRIANGLE, 0.0, 0.0), a.source_face);
+    TriangleRay rb = triangle_ray(b.origin, b.direction, Hit(b.after, NO_TRIANGLE, 0.0, 0.0), b.source_face);
     uint purpose = any_hit ? ANY : NEAREST;
     if (TRAVERSAL != STACK) return traverse_links_pair(ra, a.direction, a.t_max, rb, b.direction, b.t_max, classes, purpose);
     Filters none;

@@ -39,6 +39,10 @@ bool after(uvec3 a, uvec3 b) {
     return a.z < b.z;
 }
 
+LightSample drawn_apart() {
+    return NO_LIGHT_SAMPLE;
+}
+
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.tiles_size.count) return;

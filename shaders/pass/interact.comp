@@ -81,6 +81,10 @@ Branch next_branch() {
     return next;
 }
 
+LightSample drawn_apart() {
+    return NO_LIGHT_SAMPLE;
+}
+
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.rays_size.count) return;

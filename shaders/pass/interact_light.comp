@@ -19,9 +19,11 @@ void main() {
         Boundary boundary = boundary_at(hit, ray.media, ray.direction);
         if (!boundary.suppressed_by_priority) {
             Surface s = surface_for_lights(hit, boundary, found.triangle);
-            if (SAMPLED_APART) drawn_apart = tree_light();
-            vec3 weight = wanted(ray.events, ray.throughput * hit.coverage);
             vec3 light = radiance_to_eye(s, unpacked_pixel(known.x), known.z, 0, all_lights(), true);
+            // Read again, so that no register holds it while shadow rays are traced.
+            waiting = found_anew(waiting, shadow_rays);
+            ray = last_branch();
+            vec3 weight = wanted(ray.events, ray.throughput * hit.coverage);
             read_sum();
             sum += weight * light;
             write_sum();

@@ -17,6 +17,10 @@ layout(pass, scalar) readonly buffer Sizes { WorkSize surface_size; WorkSize bac
 // With shadow rays the lights are divided among dispatches: lavapipe ends long loops (src/pass/lighting.rs).
 layout(push_constant, scalar) uniform Push { LightRange range; uint first_dispatch; };
 
+LightSample drawn_apart() {
+    return NO_LIGHT_SAMPLE;
+}
+
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.surface_size.count) return;

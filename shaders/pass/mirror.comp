@@ -13,6 +13,10 @@ layout(pass, rgba32f) uniform image2D radiance;
 layout(pass, scalar) readonly buffer MirrorTiles { uint mirror_tiles[]; };
 layout(pass, scalar) readonly buffer Sizes { WorkSize mirrors_size; } work;
 
+LightSample drawn_apart() {
+    return NO_LIGHT_SAMPLE;
+}
+
 void main() {
     uint place = listed_tile(gl_WorkGroupID);
     if (place >= work.mirrors_size.count) return;

@@ -26,6 +26,10 @@ PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted) {
     return photon;
 }
 
+uvec4 media_before(Path p) {
+    return KEEPS_MEDIA ? media[found_anew(entry, bounce)] : p.media;
+}
+
 void main() {
     entry = own_entry();
     bool alive = (entry & TERMINATED) == 0;

@@ -41,6 +41,7 @@ pub fn interact<'a>(
     // Ray hits are outside of the light tiles, so they loop over all lights.
     library.lighting.local_lights = lighting.plan.local_lights;
     library.lighting.tile_words = 0;
+    library.lighting.lit_at_hits = true;
     library.lighting.light_budget = library.loops.loop_budget;
     library.gbuffer.stored_triangles = true;
     // Many surfaces that rays meet share a pixel.

@@ -152,6 +152,7 @@ impl<'a> OnDevice<'a> {
                 light_budget: u32::MAX,
                 screen_mirrors: false,
                 sampled_apart: false,
+                lit_at_hits: false,
             },
             loops: match scene.device().limits_loops() {
                 true => lib::loops::Constants::default(),
