@@ -462,6 +462,7 @@ fn compilers_spill_no_register() {
         return;
     }
     let mut spilling = BTreeSet::new();
+    let mut largest: BTreeMap<&str, u64> = BTreeMap::new();
     let mut told = 0;
     for (i, (ways, choice)) in spread().iter().enumerate() {
         for by_paths in [false, true].into_iter().filter(|by_paths| !by_paths || i % 8 == 0) {
@@ -472,10 +473,16 @@ fn compilers_spill_no_register() {
                 let compiled = gpu.device.compiled(program, constants).expect("statistics");
                 told += compiled.iter().filter(|compiled| compiled.footprint().is_some()).count();
                 let spilled: u64 = compiled.iter().filter_map(Compiled::footprint).map(|of| of.spilled).sum();
+                for of in compiled.iter().filter_map(Compiled::footprint) {
+                    let most = largest.entry(program.name).or_default();
+                    *most = of.registers.max(*most);
+                }
                 spilling.extend((spilled > 0).then(|| format!("{} in plan {i}: {spilled}", program.name)));
             }
         }
     }
+    largest.retain(|_, registers| *registers > 128);
+    eprintln!("{device}: of {told} kernels more than 128 registers have {largest:?}");
     assert!(told > 2000 && spilling.is_empty(), "{device}: {told} kernels, registers spilled: {spilling:#?}");
 }
 

@@ -98,7 +98,8 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     }
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, light.l);
-        bool wanted = largest(result) > FAINTEST_LOBE * largest(light.arriving);
+        // Without a decision of its own for NaN, which is counted in the film.
+        bool wanted = !(largest(result) <= FAINTEST_LOBE * largest(light.arriving));
         if (SHADOWS == SHADOW_MAP && !(LIGHT_SAMPLES > 0 && is_sample)) {
             float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(p_rel));
             return wanted ? result * share : vec3(0.0);

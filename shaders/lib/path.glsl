@@ -120,7 +120,8 @@ ShadowRay shadow_ray_to(Path p, Interaction interaction, bool scatters, vec3 fro
     ShadowRay shadow_ray;
     float w = light.pdf > 0.0 ? mis_weight(light.pdf * float(LIGHT_SAMPLES), towards.pdf) : 1.0;
     vec3 contribution = p.throughput * towards.f_cos * light.arriving * (w / float(LIGHT_SAMPLES));
-    bool wanted = scatters && largest(contribution) > 0.0;
+    // NaN is wanted: it is counted, not dropped.
+    bool wanted = scatters && !(contribution.r + contribution.g + contribution.b <= 0.0);
     bool behind = dot(interaction.hit.n, light.to_light) < 0.0;
     shadow_ray.origin = behind ? ray_origin(interaction.hit.s.p_bvh, -interaction.hit.n, vec3(0.0)) : front_origin;
     // The sampled point on the light stays the same, wherever the ray starts.
