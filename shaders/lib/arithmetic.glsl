@@ -198,13 +198,10 @@ vec3 cross2(vec3 a, vec3 b) {
 // Ogita, Rump and Oishi: exact products and sums; their rounding errors are added in f32. Error 2^-46 of the sum of
 // magnitudes. Components stay below 1e19: the products overflow above.
 DoubleFloat dot2(vec3 a, vec3 b) {
-    // One after the other: of three at once, more registers are live.
-    DoubleFloat x = two_product(a.x, b.x);
-    DoubleFloat y = two_product(a.y, b.y);
-    DoubleFloat z = two_product(a.z, b.z);
-    DoubleFloat s = two_sum(x.hi, y.hi);
-    DoubleFloat t = two_sum(s.hi, z.hi);
-    precise float rest = ((x.lo + y.lo) + (s.lo + z.lo)) + t.lo;
+    DoubleFloat3 p = two_products(a, b);
+    DoubleFloat s = two_sum(p.hi.x, p.hi.y);
+    DoubleFloat t = two_sum(s.hi, p.hi.z);
+    precise float rest = ((p.lo.x + p.lo.y) + (s.lo + p.lo.z)) + t.lo;
     return two_sum(t.hi, rest);
 }
 

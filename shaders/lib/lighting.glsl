@@ -121,14 +121,10 @@ struct LightRange {
     uint end_word;
 };
 
-// The light of a surface waits in shared memory while shadow rays are traced, where the traversal has its stack there as well.
-const bool LIGHT_WAITS = TRAVERSAL == STACK;
-shared vec3 light_waiting[LIGHT_WAITS ? 2u * TRACING_LANES : 1u];
-
-// Word of light that waits: 0 from the lights so far, 1 from around.
-uint waiting_word(uint of, uint of_turn) {
-    return of * TRACING_LANES + found_anew(gl_LocalInvocationIndex, of_turn);
-}
+// The light of a surface that waits while shadow rays are traced (VECTORS_WAIT).
+const uint WAITING_FROM_LIGHTS = 0; // from those so far
+const uint WAITING_FROM_AROUND = 1; // emission and environment
+shared vec3 light_waiting[VECTORS_WAIT ? 2u * TRACING_LANES : 1u];
 
 // Loop iterations after which no further light is started.
 layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
@@ -140,7 +136,7 @@ uint samples_cut_off = 0;
 vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
     if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
-    if (LIGHT_WAITS) light_waiting[waiting_word(0, 0)] = sum;
+    if (VECTORS_WAIT) light_waiting[waiting_word(WAITING_FROM_LIGHTS, 0)] = sum;
     // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
     // the body of a loop at least once, and the body for a light is long.
     int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
@@ -167,13 +163,13 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
         next += listed ? 0 : 1;
         b = in_turn(b, index);
         vec3 light = light_on(b, index, is_sample, uvec2(pixel), surface);
-        if (LIGHT_WAITS) {
-            light_waiting[waiting_word(0, index)] += light;
+        if (VECTORS_WAIT) {
+            light_waiting[waiting_word(WAITING_FROM_LIGHTS, index)] += light;
         } else {
             sum += light;
         }
     }
-    return LIGHT_WAITS ? light_waiting[waiting_word(0, next)] : sum;
+    return VECTORS_WAIT ? light_waiting[waiting_word(WAITING_FROM_LIGHTS, next)] : sum;
 }
 
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
@@ -183,9 +179,9 @@ vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, Li
     // Before the lights: afterwards the albedos would take registers while shadow rays are traced.
     vec3 around = s.emissive * under_coat(s);
     if (AMBIENT || REFLECTION) around += environment_light(s, albedo);
-    if (LIGHT_WAITS) light_waiting[waiting_word(1, 0)] = around;
+    if (VECTORS_WAIT) light_waiting[waiting_word(WAITING_FROM_AROUND, 0)] = around;
     vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
-    if (LIGHT_WAITS) around = light_waiting[waiting_word(1, shadow_rays)];
+    if (VECTORS_WAIT) around = light_waiting[waiting_word(WAITING_FROM_AROUND, shadow_rays)];
     result += all_around ? around : vec3(0.0);
     return s.unlit ? all_around ? s.base : vec3(0.0) : result;
 }

@@ -161,25 +161,20 @@ PhotonSample photon_near(Path p, vec3 p_bvh, vec3 n, uvec2 pixel, bool wanted);
 // p.media: kept by the program, or read again from memory, so that no registers hold it while the BSDF is evaluated.
 uvec4 media_before(Path p);
 
-// What a path knows of a vertex waits in shared memory while the BSDF is evaluated, where the traversal has its stack there.
-const bool PATH_WAITS = TRAVERSAL == STACK;
+// What a path knows of a vertex, and what waits while the BSDF is evaluated (VECTORS_WAIT).
 const uint WAITING_THROUGHPUT = 0;
 const uint WAITING_ARRIVING = 1; // of the light sample
 const uint WAITING_WEIGHT = 2;   // of the BSDF sample
 const uint WAITING_GATHERED = 3;
-shared vec3 path_waiting[PATH_WAITS ? 4u * TRACING_LANES : 1u];
-
-uint waiting_word(uint of, uint of_turn) {
-    return of * TRACING_LANES + found_anew(gl_LocalInvocationIndex, of_turn);
-}
+shared vec3 path_waiting[VECTORS_WAIT ? 4u * TRACING_LANES : 1u];
 
 // What waits, where it does; otherwise `kept`.
-vec3 waited(uint of, uint of_turn, vec3 kept) {
-    return PATH_WAITS ? path_waiting[waiting_word(of, of_turn)] : kept;
+vec3 waited(uint which, uint of_turn, vec3 kept) {
+    return VECTORS_WAIT ? path_waiting[waiting_word(which, of_turn)] : kept;
 }
 
 void gather(inout vec3 gathered, vec3 light, uint of_turn) {
-    if (PATH_WAITS) {
+    if (VECTORS_WAIT) {
         path_waiting[waiting_word(WAITING_GATHERED, of_turn)] += light;
     } else {
         gathered += light;
@@ -255,7 +250,7 @@ vec3 shade_vertex(inout Path p, Hit found, uvec2 pixel, bool alive, out ShadowRa
     PathEval on_path = PathEval(vec3(0.0), 0.0, 0.0);
     LightSample sampled = light;
     uint last = LIGHT_SAMPLES + (PHOTON_MAP ? 1u : 0u);
-    if (PATH_WAITS) {
+    if (VECTORS_WAIT) {
         path_waiting[waiting_word(WAITING_THROUGHPUT, 0)] = p.throughput;
         path_waiting[waiting_word(WAITING_ARRIVING, 0)] = light.arriving;
         path_waiting[waiting_word(WAITING_WEIGHT, 0)] = drawn.weight;

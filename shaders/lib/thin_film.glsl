@@ -98,7 +98,9 @@ float film_unpolarised(Film film, vec2 rho, int channel) {
 vec3 film_over_dielectric(Film film, float n2) {
     float cos_behind = sqrt(max(1.0 - film.sin2 / (n2 * n2), 0.0));
     vec2 rho = interface_amplitudes(film.cos_film, cos_behind, film.n, n2);
-    vec3 f = vec3(film_unpolarised(film, rho, 0), film_unpolarised(film, rho, 1), film_unpolarised(film, rho, 2));
+    // The channels in a loop: the code exists once, and one after the other they need fewer registers.
+    vec3 f;
+    for (int i = 0; i < 3; i++) f[i] = film_unpolarised(film, rho, i);
     return film.total ? vec3(1.0) : f;
 }
 
@@ -106,8 +108,8 @@ vec3 film_over_dielectric(Film film, float n2) {
 // denser medium.
 vec3 film_over_metal(Film film, vec3 metal) {
     vec3 rho = sqrt(clamp(metal, 0.0, 1.0));
-    vec3 f = vec3(film_unpolarised(film, vec2(-rho.x, rho.x), 0), film_unpolarised(film, vec2(-rho.y, rho.y), 1),
-                  film_unpolarised(film, vec2(-rho.z, rho.z), 2));
+    vec3 f;
+    for (int i = 0; i < 3; i++) f[i] = film_unpolarised(film, vec2(-rho[i], rho[i]), i);
     return film.total ? vec3(1.0) : f;
 }
 #endif

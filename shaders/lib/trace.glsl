@@ -177,11 +177,14 @@ ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
     return sheared_triangle(sheared(shear, a), sheared(shear, b), sheared(shear, c));
 }
 
-ShearedTriangle selected_from(BvhTriangle triangle, vec3 origin, ShearTerms terms) {
-    precise vec3 a = triangle.a - origin;
-    precise vec3 b = triangle.b - origin;
-    precise vec3 c = triangle.c - origin;
-    return sheared_triangle(sheared_by_selection(terms, a), sheared_by_selection(terms, b), sheared_by_selection(terms, c));
+vec3 sheared_corner(vec3 corner, TriangleRay r) {
+    precise vec3 p = corner - r.origin;
+    if (TRAVERSAL == STACK) return sheared_by_selection(r.terms, p);
+    return sheared(r.shear, p);
+}
+
+ShearedTriangle sheared_for(BvhTriangle triangle, TriangleRay r) {
+    return sheared_triangle(sheared_corner(triangle.a, r), sheared_corner(triangle.b, r), sheared_corner(triangle.c, r));
 }
 
 // Tests one triangle of the stored leaf. The nearest hit counts, and of two at the same t the first triangle. So the result
@@ -194,12 +197,7 @@ void test_triangle(inout Traversal w, inout Filters f, TriangleRay r, BoxRay b, 
     BvhTriangle triangle = triangle_at(index);
     bool counts = pending && (triangle.stops & classes) != 0 && triangle.face != r.source_face;
     bool filters = (triangle.stops & FILTER) != 0;
-    ShearedTriangle s;
-    if (TRAVERSAL == STACK) {
-        s = selected_from(triangle, r.origin, r.terms);
-    } else {
-        s = sheared_from(triangle, r.origin, r.shear);
-    }
+    ShearedTriangle s = sheared_for(triangle, r);
     float inverse = 1.0 / s.det;
     float t = s.depth * inverse / r.terms.dz;
     bool hit = counts && s.inside && s.det != 0.0;
@@ -282,6 +280,13 @@ const uint TRACING_LANES = 64;
 const uint SHORT_STACK = 8;
 // Entry by entry: neighbouring invocations access neighbouring words.
 shared int traversal_stacks[TRAVERSAL == STACK ? SHORT_STACK * TRACING_LANES : 1u];
+
+// Where the stack is in shared memory, so are vectors that a shader does not need while it traces rays or evaluates a BSDF: they
+// would take its registers. A program has an array of them; the word of number `which` of this invocation is found anew.
+const bool VECTORS_WAIT = TRAVERSAL == STACK;
+uint waiting_word(uint which, uint of_turn) {
+    return which * TRACING_LANES + found_anew(gl_LocalInvocationIndex, of_turn);
+}
 
 // The way from the root of the BVH to a node, one bit for each level.
 const uint TRAIL_LEVELS = 64;
