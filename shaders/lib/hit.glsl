@@ -49,9 +49,13 @@ ivec2 two_wrapped(int i, int size, uint mode) {
 }
 
 // One of the channels of four texels, between them by `share`: the texels at low x and high x, first of low y, then of high y.
-float between_texels(vec4 of_texels, vec2 share, bool srgb) {
-    if (srgb) of_texels = vec4(linear_from_srgb(of_texels.xyz), linear_channel(of_texels.w));
+float between_texels(vec4 of_texels, vec2 share) {
     return mix(mix(of_texels.x, of_texels.y, share.x), mix(of_texels.z, of_texels.w, share.x), share.y);
+}
+
+float between_colors(vec4 of_texels, vec2 share, bool srgb) {
+    if (srgb) of_texels = vec4(linear_from_srgb(of_texels.xyz), linear_channel(of_texels.w));
+    return between_texels(of_texels, share);
 }
 
 // A texture of a material at uv, bilinear within one mip level: the one whose texels are `footprint` wide in units of uv.
@@ -88,9 +92,8 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     vec4 d = unpackUnorm4x8(imageLoad(texels, rows.y + columns.y).x);
     // Channel by channel: the four texels wait as words, a register each. Texel by texel, ten more registers were live (RADV).
     bool srgb = (flags & TEXELS_SRGB) != 0;
-    vec4 r;
-    for (int i = 0; i < 4; i++) r[i] = between_texels(vec4(a[i], b[i], c[i], d[i]), share, srgb && i < 3);
-    return r;
+    return vec4(between_colors(vec4(a.r, b.r, c.r, d.r), share, srgb), between_colors(vec4(a.g, b.g, c.g, d.g), share, srgb),
+                between_colors(vec4(a.b, b.b, c.b, d.b), share, srgb), between_texels(vec4(a.a, b.a, c.a, d.a), share));
 }
 
 bool has_hit_texture(uint material, uint slot) {

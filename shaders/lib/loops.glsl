@@ -12,17 +12,26 @@ shared uint loop_iterations;
 // 40,000 of its own leave room for the others.
 layout(constant) const uint LOOP_BUDGET = 40000;
 
-// x, where `of_turn` is below 2^31 and is known only within a turn of a loop. A compiler does not know that it is below, so it
-// computes in each turn what follows from x, instead of once before the loop. Until a turn needs it, no register holds it.
+// On GPUs what follows from the constants of a loop is computed in each turn: until a turn needs it, no register holds it. CPUs
+// compute it once, and have memory for it.
+layout(constant) const bool FINDS_ANEW = false;
+
+// 0 where `of_turn` is below 2^31 and is known only within a turn of a loop. A compiler does not know that it is below, so what
+// follows from a value combined with this is computed in each turn, instead of once before the loop.
+uint zero_of(uint of_turn) {
+    return FINDS_ANEW ? of_turn >> 31 : 0u;
+}
+
+// x, found anew in a turn.
 uint found_anew(uint x, uint of_turn) {
-    return x ^ (of_turn >> 31);
+    return x ^ zero_of(of_turn);
 }
 
 float found_anew(float x, uint of_turn) {
-    return uintBitsToFloat(floatBitsToUint(x) ^ (of_turn >> 31));
+    return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
 }
 
 vec3 found_anew(vec3 x, uint of_turn) {
-    return uintBitsToFloat(floatBitsToUint(x) ^ (of_turn >> 31));
+    return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
 }
 #endif

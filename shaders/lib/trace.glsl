@@ -177,14 +177,20 @@ ShearedTriangle sheared_from(BvhTriangle triangle, vec3 origin, Shear shear) {
     return sheared_triangle(sheared(shear, a), sheared(shear, b), sheared(shear, c));
 }
 
-vec3 sheared_corner(vec3 corner, TriangleRay r) {
-    precise vec3 p = corner - r.origin;
-    if (TRAVERSAL == STACK) return sheared_by_selection(r.terms, p);
-    return sheared(r.shear, p);
-}
-
 ShearedTriangle sheared_for(BvhTriangle triangle, TriangleRay r) {
-    return sheared_triangle(sheared_corner(triangle.a, r), sheared_corner(triangle.b, r), sheared_corner(triangle.c, r));
+    precise vec3 a = triangle.a - r.origin;
+    precise vec3 b = triangle.b - r.origin;
+    precise vec3 c = triangle.c - r.origin;
+    if (TRAVERSAL == STACK) {
+        a = sheared_by_selection(r.terms, a);
+        b = sheared_by_selection(r.terms, b);
+        c = sheared_by_selection(r.terms, c);
+    } else {
+        a = sheared(r.shear, a);
+        b = sheared(r.shear, b);
+        c = sheared(r.shear, c);
+    }
+    return sheared_triangle(a, b, c);
 }
 
 // Tests one triangle of the stored leaf. The nearest hit counts, and of two at the same t the first triangle. So the result

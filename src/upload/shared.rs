@@ -11,7 +11,7 @@ use super::environment::EnvironmentOnDevice;
 use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource, Sampled};
-use crate::plan::{Attenuation, Knobs, March, Plan, Rays};
+use crate::plan::{Architecture, Attenuation, Knobs, March, Plan, Rays};
 pub use crate::shader::Library;
 use crate::shader::{PATHS, SCENE, lib};
 
@@ -154,9 +154,12 @@ impl<'a> OnDevice<'a> {
                 sampled_apart: false,
                 lit_at_hits: false,
             },
-            loops: match scene.device().limits_loops() {
-                true => lib::loops::Constants::default(),
-                false => lib::loops::Constants { loop_budget: u32::MAX },
+            loops: lib::loops::Constants {
+                loop_budget: match scene.device().limits_loops() {
+                    true => lib::loops::Constants::default().loop_budget,
+                    false => u32::MAX,
+                },
+                finds_anew: plan.architecture == Architecture::Gpu,
             },
             path: lib::path::Constants { emissive_lights: plan.light_samples.emitting },
             photon_map: lib::photon_map::Constants { photon_map: paths.photons > 0 },
