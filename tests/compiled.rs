@@ -60,8 +60,8 @@ fn figures(gpu: &Gpu) -> Figures {
 const REGISTER_FILE: u64 = 1024;
 
 /// No kernel keeps registers or arrays in memory, none has much more code than the 32 KB that a cache of instructions
-/// holds, and none has more than 128 registers. A SIMD unit with more than 1,024 (RDNA 3) hands them out in larger steps:
-/// what its subgroups have in all shows it.
+/// holds, and none has more than 128 registers. A SIMD unit with more than 1,024 (RDNA 3) hands them out in larger
+/// steps: what its subgroups have in all shows it.
 fn check_size(device: &str, figures: &Figures) {
     let too_large = |of: &Footprint| {
         let crowds = of.registers > 128 && of.registers * of.subgroups <= REGISTER_FILE;
