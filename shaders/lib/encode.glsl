@@ -78,6 +78,7 @@ float depth_round_trip(float z, float near, float far) {
     return z_back;
 }
 
+// linear_from_srgb of one channel: the channels one after the other need fewer registers.
 float linear_channel(float x) {
     float t = (x + 0.055) / 1.055;
     float q = sqrt(sqrt(t));

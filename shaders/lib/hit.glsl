@@ -53,6 +53,7 @@ float between_texels(vec4 of_texels, vec2 share) {
     return mix(mix(of_texels.x, of_texels.y, share.x), mix(of_texels.z, of_texels.w, share.x), share.y);
 }
 
+// The same of a channel of colour, which may be stored as sRGB.
 float between_colors(vec4 of_texels, vec2 share, bool srgb) {
     if (srgb) of_texels = vec4(linear_from_srgb(of_texels.xyz), linear_channel(of_texels.w));
     return between_texels(of_texels, share);
@@ -90,7 +91,7 @@ vec4 hit_texture(uint material, uint slot, vec4 uv_sets, float footprint) {
     vec4 b = unpackUnorm4x8(imageLoad(texels, rows.x + columns.y).x);
     vec4 c = unpackUnorm4x8(imageLoad(texels, rows.y + columns.x).x);
     vec4 d = unpackUnorm4x8(imageLoad(texels, rows.y + columns.y).x);
-    // Channel by channel: the four texels wait as words, a register each. Texel by texel, ten more registers were live (RADV).
+    // Channel by channel: the four texels wait as words, a register each. Texel by texel, three more registers were live (RADV).
     bool srgb = (flags & TEXELS_SRGB) != 0;
     return vec4(between_colors(vec4(a.r, b.r, c.r, d.r), share, srgb), between_colors(vec4(a.g, b.g, c.g, d.g), share, srgb),
                 between_colors(vec4(a.b, b.b, c.b, d.b), share, srgb), between_texels(vec4(a.a, b.a, c.a, d.a), share));

@@ -43,7 +43,7 @@ LightSample light_sample(vec3 origin, uvec2 pixel, uint surface, uint i) {
 }
 
 layout(constant) const bool SAMPLED_APART = false; // another kernel has drawn the first light sample of the surface
-// Reads it where it is needed: no register holds it while rays are traced.
+// Gives it where it is needed, as the program has it: no register holds it while rays are traced.
 LightSample drawn_apart();
 
 // The surfaces are hits of rays: p_rel and p_bvh are the same point.
@@ -98,7 +98,7 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
     }
     if (SHADOWS != 0) {
         result *= terminator(s.n, s.n_triangle, light.l);
-        // Without a decision of its own for NaN, which is counted in the film.
+        // NaN is wanted too: the film counts it.
         bool wanted = !(largest(result) <= FAINTEST_LOBE * largest(light.arriving));
         if (SHADOWS == SHADOW_MAP && !(LIGHT_SAMPLES > 0 && is_sample)) {
             float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(p_rel));

@@ -209,7 +209,7 @@ vec3 sheared(Shear s, vec3 p) {
     return vec3(along(s.x, p), along(s.y, p), along(s.z, p));
 }
 
-// The same numbers without a matrix: nine registers fewer, and fewer instructions where a selection is one.
+// The same numbers without a matrix: fewer registers, and fewer instructions where a selection is one.
 vec3 sheared_by_selection(ShearTerms t, vec3 p) {
     vec3 q = axis_last(p, t.axis);
     precise vec2 across = q.xy - t.shear * q.z;
