@@ -27,7 +27,7 @@ use etalon_cost::table::{Point, Table};
 use etalon_cost::warm::Bench;
 
 /// Seconds of the quick run that measures where no table is kept.
-const QUICK_S: u32 = 30;
+const QUICK_S: u32 = 60;
 /// Points that are timed before the fastest point is taken.
 const TRIALS: usize = 4;
 /// Random seed of all measurements; the seed of the picture does not change the choice.
@@ -208,7 +208,8 @@ impl Budget {
             truth: Arc::new(truth),
         };
         let Interval { median, low, high } = chosen.error;
-        let nearest = if possible { "" } else { " (no measured choice keeps the limit; this one comes closest)" };
+        let nearest =
+            if possible { "" } else { " (no measured choice is sure to keep the limit; this one comes closest)" };
         steps.tell(&format!(
             "{budget} {limit}: using \"{}\"{nearest}: {:.1} ms ({:.1} … {:.1}) and an error of {:.2} % ({:.2} … {:.2}) when measured; \
              simplified: {}",

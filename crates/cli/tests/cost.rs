@@ -98,8 +98,8 @@ fn a_run_is_what_its_commands_draw() {
     // The cards describe what each setting loses. `light-sampler` changes only the noise of paths, and no card of a
     // picture without paths lists it.
     let settings = page.split("id=\"trust\"").next().expect("a beginning");
-    let says_most =
-        ["loses most by", "costs most", "No setting can be recommended"].iter().any(|says| settings.contains(says));
+    let mostly = ["that error comes from", "adds the most error", "No setting can be recommended"];
+    let says_most = mostly.iter().any(|says| settings.contains(says));
     assert!(settings.contains("you lose") && says_most, "{settings:.2000}");
     assert!(!settings.contains("<b>light-sampler="), "{settings:.2000}");
     let csv = std::fs::read_to_string(at.join("a/cost.csv")).expect("cost.csv");

@@ -38,6 +38,9 @@ const FIRST_SHARE: f64 = 0.12;
 const AGAIN: u32 = 4;
 /// Budgets from this many seconds on write a preliminary report.
 const EARLY_S: f64 = 90.0;
+/// Resolution of the first round above which changes of `local` can hardly be judged. Changes relative to `exact` are
+/// compared with each other, and come first, in at most half of the time for both.
+const UNRESOLVED: f64 = 0.1;
 /// Estimated time to measure the growth of times with pixels: seconds for four starts, and a number of path-traced
 /// samples. Chosen rather too large.
 const GROWTH_S: f64 = 1.6;
@@ -123,7 +126,8 @@ impl Run<'_> {
         let (mut truth, mut reference) = self.describe(&refined, agenda.priced())?;
         let wanted = self.wanted(&reference);
         let mut local = m.base(&base_task("local", Family::Preset, &agenda.local), listener.step)?;
-        self.expect(&mut m, &agenda);
+        let exact_first = reference.resolution > UNRESOLVED;
+        self.expect(&mut m, &agenda, exact_first);
         if self.ends() {
             let begun = Instant::now();
             Judge { truth: &truth, reference: &reference, folder }.judge(&m.records)?;
@@ -136,7 +140,16 @@ impl Run<'_> {
         }
         m.pace.reserved_s = self.reserved_s(&refined, wanted, known_ms);
         // The most informative pictures come first, in case the budget ends.
-        for task in presets.iter().chain(&agenda.of_local) {
+        for task in presets {
+            m.picture(task, &mut local, listener.step)?;
+        }
+        if exact_first {
+            let of_reference = m.pace.reserved_s;
+            m.pace.reserved_s += 0.5 * (m.pace.left_s() - of_reference).max(0.0);
+            self.prices_of_exact(&mut m, &agenda, listener)?;
+            m.pace.reserved_s = of_reference;
+        }
+        for task in &agenda.of_local {
             m.picture(task, &mut local, listener.step)?;
         }
         if shard == [1, 1] {
@@ -149,7 +162,7 @@ impl Run<'_> {
         for task in &agenda.ladder {
             m.picture(task, &mut local, listener.step)?;
         }
-        // The reference gets its share before the changes relative to `exact`, whose errors need a good reference.
+        // The reference gets its share before the changes relative to `exact`: that of `indirect` needs a good one.
         let share = std::mem::take(&mut m.pace.reserved_s);
         let rounds = refined.rounds();
         refined = self.more(refined, &m.pace, wanted, share, listener)?;
@@ -162,7 +175,9 @@ impl Run<'_> {
             (listener.early)(&self.table(&judge.judge(&m.records)?, &m, &reference, states, &found))?;
             m.pace.judged(m.records.len(), begun.elapsed().as_secs_f64());
         }
-        self.prices_of_exact(&mut m, &agenda, listener)?;
+        if !exact_first {
+            self.prices_of_exact(&mut m, &agenda, listener)?;
+        }
         self.orders(&mut m, &agenda, &mut found, listener)?;
 
         let tries_without_waste = shard == [1, 1] && m.records.iter().any(|record| record.name == "exact");
@@ -280,8 +295,8 @@ impl Run<'_> {
         Ok((truth, reference))
     }
 
-    /// Adds the coming pictures to the clock.
-    fn expect(&self, m: &mut Measuring<'_>, agenda: &Agenda) {
+    /// Adds the coming pictures to the clock, in the order in which they are drawn.
+    fn expect(&self, m: &mut Measuring<'_>, agenda: &Agenda, exact_first: bool) {
         let pilot = &self.pilot;
         let (local, plain) = (&agenda.local, &agenda.plain);
         let drawn = m.records.last().map_or(0.0, |record| Interval::of(&record.ms).median);
@@ -290,12 +305,21 @@ impl Run<'_> {
         pace.forecast.path_ms = pilot.plain_ms;
         pace.forecast.start_s = m.records.last().map_or(0.0, |record| record.start_ms / 1e3);
         pace.forecast.raster_ms = drawn / f64::from(local.samples.count());
-        let mut expect = |knobs, base| pace.forecast.expect(knobs, base);
-        agenda.presets.iter().chain(&agenda.of_local).for_each(|task| expect(&task.knobs, local));
+        let mut expect = |knobs: &Knobs, base: &Knobs| pace.forecast.expect(knobs, base);
+        let of_exact = |expect: &mut dyn FnMut(&Knobs, &Knobs)| {
+            expect(plain, plain);
+            agenda.of_exact.iter().for_each(|task| expect(&task.knobs, plain));
+        };
+        agenda.presets.iter().for_each(|task| expect(&task.knobs, local));
+        if exact_first {
+            of_exact(&mut expect);
+        }
+        agenda.of_local.iter().for_each(|task| expect(&task.knobs, local));
         (0..PICTURES - 1).for_each(|_| expect(local, local));
         agenda.ladder.iter().for_each(|task| expect(&task.knobs, local));
-        expect(plain, plain);
-        agenda.of_exact.iter().for_each(|task| expect(&task.knobs, plain));
+        if !exact_first {
+            of_exact(&mut expect);
+        }
         let with_orders = agenda.orders && self.sweep.extent.shard[0] == 1;
         (0..if with_orders { orders::PICTURES } else { 0 }).for_each(|_| expect(local, local));
         expect(plain, local);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::Result;
 
 use super::agenda::{Agenda, States, Task, with_indirect};
-use super::command::set;
+use super::command::{named, set};
 use super::judge::{Judge, Record};
 use super::measure::{Base, Measuring};
 use super::pace::Step;
@@ -33,6 +33,11 @@ struct Rung {
 
 fn task(name: String, knobs: &Knobs) -> Task {
     Task { name, family: Family::Search, knobs: knobs.clone(), change: None }
+}
+
+/// The drawn preset with these knobs: that is what a combination may come back to.
+fn preset<'r>(records: &'r [Record], knobs: &Knobs) -> Option<&'r Record> {
+    records.iter().find(|record| record.family == Family::Preset && record.knobs == named(knobs))
 }
 
 /// Measured changes of each rung relative to `local`, and the time of `local` in milliseconds.
@@ -81,7 +86,12 @@ pub fn search(
             knobs = changed;
         }
     }
-    let mut current = measuring.picture(&task("search: quickest".to_owned(), &knobs), base, progress)?;
+    let mut draw = |measuring: &mut Measuring<'_>, name: String, knobs: &Knobs| match preset(&measuring.records, knobs)
+    {
+        Some(known) => Ok(Some(known.clone())),
+        None => measuring.picture(&task(name, knobs), base, progress),
+    };
+    let mut current = draw(measuring, "search: quickest".to_owned(), &knobs)?;
     let mut refused: Vec<(&str, &str)> = Vec::new();
     for step in 1..PICTURES - 1 {
         let Some(known) = &current else { break };
@@ -119,9 +129,7 @@ pub fn search(
         let Some((_, knob, to, gain)) = worth else { break };
         let changed = set(&knobs, knob, to)?;
         let change = format!("{knob}: {} → {to}", local_rung(&knobs, knob));
-        let Some(found) = measuring.picture(&task(format!("search: step {step}"), &changed), base, progress)? else {
-            break;
-        };
+        let Some(found) = draw(measuring, format!("search: step {step}"), &changed)? else { break };
         let then = judge.display(&found)?;
         let found_error = judge.truth.shown.error(&then);
         let kept = judge.truth.shown.more_error(&then, &now).is_below(sure);
@@ -185,4 +193,32 @@ pub fn without_waste(
     let [promised, now] = [&before, &after].map(|display| judge.truth.shown.error(display).interval().root().median);
     let kept = !judge.truth.shown.more_error(&after, &before).is_above(standard_errors(STATEMENTS, MANY));
     Ok(Some(Tried { change: format!("exact with {}", saved.join(", ")), promised, found: now, kept }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use etalon::plan::Model;
+
+    #[test]
+    fn a_combination_that_is_a_preset_is_not_drawn_again() {
+        let record = |name: &str, family: &str, knobs: &Knobs| -> Record {
+            serde_json::from_value(serde_json::json!({
+                "name": name, "family": family, "knobs": named(knobs), "ms": [], "baseline_ms": [], "start_ms": 0.0, "passes": [],
+                "noise": null, "work": {}, "command": "", "image": "", "picture": name, "pair": null,
+            }))
+            .expect("a record")
+        };
+        let (local, recursive) = (Knobs::of(Model::Local), Knobs::of(Model::Recursive));
+        let one = set(&local, "samples", "1").expect("a rung");
+        let all = [
+            record("local", "preset", &local),
+            record("local samples=1", "local", &one),
+            record("recursive", "preset", &recursive),
+        ];
+        let found = |knobs: &Knobs| preset(&all, knobs).map(|record| record.name.as_str());
+        assert_eq!([found(&local), found(&recursive)], [Some("local"), Some("recursive")]);
+        // A single change may owe its error to two that cancel: only the search recommends it.
+        assert_eq!(found(&one), None);
+    }
 }

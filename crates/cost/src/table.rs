@@ -389,11 +389,12 @@ pub const INVISIBLE: f64 = 0.002;
 
 impl Price {
     /// Whether the change costs time and buys nothing: neither less error, nor less noise, nor a visible difference.
+    /// What noise hides is not known to be nothing.
     #[must_use]
     pub fn is_wasted(&self) -> bool {
         let nearer = self.base != Family::Exact && self.error_told && self.shown_delta.median < 0.0;
-        let calmer = self.noise_ratio.is_some_and(|ratio| ratio < 1.0);
-        self.takes_longer() && !nearer && !calmer && !self.is_seen()
+        let unseen = self.noise_ratio.map_or(self.flip_between < INVISIBLE, |ratio| ratio >= 1.0);
+        self.takes_longer() && !nearer && unseen
     }
 
     /// Whether the change takes significantly longer than the base.

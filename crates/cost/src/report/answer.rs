@@ -65,8 +65,8 @@ pub(super) fn lead(table: &Table) -> Markup {
     }
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
-        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) (spread(table, point)) " on " (table.device.name)
-        @if table.device.kind == "cpu" { ", a CPU," }
+        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) (spread(table, point))
+        @if table.device.kind == "cpu" { " on the CPU (" (table.device.name) ")" } @else { " on " (table.device.name) }
         " and has an " (words::link("error", "error")) " of " (percent(point.error())) " of the range from black to white"
         @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } ". "
         (most_lost(table, point))
@@ -94,8 +94,8 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
                     img src=(picture) width=(size(table)[0]) height=(size(table)[1]) alt={ "Picture of the setting " (title(point)) };
                     @if let Some(worst) = worst {
                         figure {
-                            img.pixels src=(worst) width=(WORST[0]) height=(WORST[1]) alt="The pixels with the largest difference";
                             figcaption { "the place where it differs most, enlarged: the reference on the left, this picture on the right" }
+                            img.pixels src=(worst) width=(WORST[0]) height=(WORST[1]) alt="The pixels with the largest difference";
                         }
                     }
                     table.facts { tbody {
@@ -104,7 +104,7 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
                         tr { th scope="row" { "you lose" } td { (lost(table, point)) } }
                     } }
                     @if point.name == REFERENCE && table.reference.rounds.len() > 1 {
-                        p.quiet { "The time is that of its " (table.reference.samples) " samples in " (table.reference.rounds.len()) " pictures. One picture of about this quality:" }
+                        p.quiet { "It is the mean of " (table.reference.rounds.len()) " pictures, with " (table.reference.samples) " samples of each pixel in all; the time is that of all of them. One picture of about this quality:" }
                     }
                     (command_line(&command.replace(" --repeat 3", "")))
                 }
@@ -114,7 +114,7 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     Ok(html! {
         section #settings {
             h2 { "Recommended settings" }
-            p { "A rung is a value of a knob, and a setting has a rung of every knob. " b { "quick" } " is the fastest setting, or a slower one with far less error for less than twice its time; " b { "balanced" } " is the fastest whose error is within " (plain(100.0 * (WORTH - 1.0))) " % of the least for at most " (plain(DEARER)) " times the time of quick; " b { "exact" } " has the least error. An error in parentheses is what a more exact rung takes away; errors add by their squares." }
+            p { "Each setting is a list of choices, as in refraction=off: a " (words::link("rung", "knob and its rung")) ". " b { "quick" } " is the fastest, or a slower one with far less error for less than twice its time. " b { "balanced" } " has at most " (plain(WORTH)) " times the least error that " (plain(DEARER)) " times the time of quick can buy. " b { "exact" } " has the least error, whatever its time. In parentheses is the error that a more exact choice takes away. Errors add by their squares, so these do not sum to the whole." }
             div.settings { @for card in &cards { (card) } }
         }
     })
@@ -123,11 +123,14 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
 /// Largest number of losses that a card describes; the card folds the others.
 const MOST: usize = 4;
 
-/// Simplified knobs of a point whose effect is visible here, with their losses: the largest error first.
+/// Simplified knobs of a point whose effect is visible here, with their losses: the largest error first. An error below
+/// the reference's resolution is not told beside errors that have to exceed it.
 fn visible<'a>(table: &'a Table, point: &'a Point) -> Vec<(Simplified<'a>, Loss)> {
+    let told =
+        |loss: Loss| Loss { error: if loss.error < table.reference.resolution { 0.0 } else { loss.error }, ..loss };
     let all = table.simplified(point).into_iter();
     let mut all: Vec<_> =
-        all.filter_map(|choice| Some((choice, choice.loss.filter(|loss| loss.flip > 0.0)?))).collect();
+        all.filter_map(|choice| Some((choice, told(choice.loss.filter(|loss| loss.flip > 0.0)?)))).collect();
     all.sort_by(|(_, a), (_, b)| (b.error, b.flip).partial_cmp(&(a.error, a.flip)).unwrap_or(Ordering::Equal));
     all
 }
@@ -147,12 +150,12 @@ fn most_lost(table: &Table, point: &Point) -> Markup {
     let unknown = all.iter().filter(|choice| choice.loss.is_none()).count();
     let most = visible.first().filter(|(_, loss)| loss.error.powi(2) >= MOSTLY * point.error().powi(2));
     html! {
-        @if let Some((choice, loss)) = most { "It loses most by " b { (choice) } (in_parentheses(*loss)) ": " (choice.about()) }
+        @if let Some((choice, loss)) = most { "Most of that error comes from " b { (choice) } (in_parentheses(*loss)) ": " (choice.about()) }
         @else if unknown > 0 && explained(table, point) < MOSTLY {
-            "What it loses most by is not known: " (unknown) @if unknown == 1 { " simplified knob was" } @else { " simplified knobs were" }
+            "What most of that error comes from is not known: " (unknown) @if unknown == 1 { " simplified knob was" } @else { " simplified knobs were" }
             " not compared with a more exact rung."
         }
-        @else if let Some((choice, loss)) = visible.first() { "Of what it simplifies, " b { (choice) } (in_parentheses(*loss)) " costs most: " (choice.about()) }
+        @else if let Some((choice, loss)) = visible.first() { "Of its choices " b { (choice) } (in_parentheses(*loss)) " adds the most error: " (choice.about()) }
         @else { "It loses nothing that is visible here." }
     }
 }
@@ -183,8 +186,8 @@ fn lost(table: &Table, point: &Point) -> Markup {
     };
     let rest: Vec<Simplified<'_>> = rest.iter().map(|(choice, _)| *choice).collect();
     html! {
-        @if point.name == REFERENCE && table.reference.lacks_bands() { "bands of wavelengths; noise is left" }
-        @else if point.name == REFERENCE { "nothing; noise is left" }
+        @if point.name == REFERENCE && table.reference.lacks_bands() { "bands of wavelengths; it has noise" }
+        @else if point.name == REFERENCE { "nothing, but it has noise" }
         @else if all.is_empty() { "nothing" }
         @else if told.is_empty() && all.iter().all(|choice| choice.loss.is_some()) { "nothing that is visible here" }
         @else if told.is_empty() { "not known" }

@@ -54,7 +54,7 @@ fn digits(x: f64) -> String {
 }
 
 fn percent(x: f64) -> String {
-    format!("{} %", digits(100.0 * x))
+    format!("{}\u{a0}%", digits(100.0 * x))
 }
 
 /// A number without trailing zeros, for axes and exact values.
@@ -70,9 +70,9 @@ fn plain(x: f64) -> String {
 /// A time in milliseconds or seconds.
 fn time(ms: f64) -> String {
     match ms {
-        600_000.0.. => format!("{} min", digits(ms / 60_000.0)),
-        1000.0.. => format!("{} s", digits(ms / 1000.0)),
-        _ => format!("{} ms", digits(ms)),
+        600_000.0.. => format!("{}\u{a0}min", digits(ms / 60_000.0)),
+        1000.0.. => format!("{}\u{a0}s", digits(ms / 1000.0)),
+        _ => format!("{}\u{a0}ms", digits(ms)),
     }
 }
 
@@ -89,9 +89,12 @@ fn title(point: &Point) -> String {
         (Family::Search, Some("exact without waste")) => "reference quality, useless rungs off".to_owned(),
         (Family::Search, Some(step)) => {
             let (model, changed) = point.rungs().map(|knobs| nearest_preset(&knobs)).unwrap_or_default();
-            let knobs = if changed.len() == 1 { "knob" } else { "knobs" };
-            let number = step.trim_start_matches("step ");
-            format!("combination {number} ({model} with {} {knobs} changed)", changed.len())
+            let changed: Vec<&str> = changed.iter().map(|option| option.trim_start_matches("--set ")).collect();
+            match changed.len() {
+                0 => model.to_owned(),
+                1 | 2 => format!("{model} with {}", changed.join(" and ")),
+                n => format!("combination {} ({model} with {n} knobs changed)", step.trim_start_matches("step ")),
+            }
         }
         // `exact` is also a recommended setting.
         _ => match point.name.strip_prefix("exact") {

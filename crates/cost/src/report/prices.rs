@@ -48,7 +48,8 @@ pub(super) fn matters(table: &Table) -> Markup {
     let knobs = table.knobs.iter().filter(|knob| knob.called_for);
     let changes_error = |name: &str| better.iter().chain(&worse).chain(&undoing).any(|price| price.knob == name);
     let unseen = knobs.filter(|knob| harmless(table, &knob.knob) && !changes_error(&knob.knob));
-    let unseen: Vec<&str> = unseen.map(|knob| knob.knob.as_str()).collect();
+    let (unseen, unseen_in_local): (Vec<&str>, Vec<&str>) =
+        unseen.map(|knob| knob.knob.as_str()).partition(|knob| of(Family::Exact).any(|price| price.knob == *knob));
     let hidden = table.prices.iter().filter(|p| !p.error_told && !p.same && p.flip_between >= INVISIBLE).count();
     let spent = |price: &Price| {
         html! {
@@ -80,8 +81,9 @@ pub(super) fn matters(table: &Table) -> Markup {
                 ul { @for price in &undoing { li { (changes(price)) } } }
             }
             h2 { "Useless here" }
-            @if wasted.is_empty() && unseen.is_empty() { p { "No measured rung costs time without an effect." } }
+            @if wasted.is_empty() && unseen.is_empty() && unseen_in_local.is_empty() { p { "No measured rung costs time without an effect." } }
             @if !unseen.is_empty() { p { "No visible effect here: " (unseen.join(", ")) "." } }
+            @if !unseen_in_local.is_empty() { p { "No visible effect in " em { "local" } ", and not measured with the reference's rungs: " (unseen_in_local.join(", ")) "." } }
             @if !wasted.is_empty() {
                 ul { @for price in &wasted { li { (from_to(price)) " (" (class(price.base)) ") takes " (time(price.gpu_ms_delta.median)) " more without a measurable change" } } }
             }
