@@ -65,13 +65,13 @@ pub(super) fn lead(table: &Table) -> Markup {
     }
     let seen = table.prices.iter().any(|price| !price.same && price.flip_between >= crate::table::INVISIBLE);
     html! {
-        "Use " b { (title(point)) } ": a picture takes " (takes(table, point)) (spread(table, point))
+        "Use " b { (title(point)) } ", the balanced setting: a picture takes " (takes(table, point)) (spread(table, point))
         @if table.device.kind == "cpu" { " on the CPU (" (table.device.name) ")" } @else { " on " (table.device.name) }
         " and has an " (words::link("error", "error")) " of " (percent(point.error())) " of the range from black to white"
         @if table.asked.is_some() { " (measured at " (table.size[0]) "×" (table.size[1]) ")" } ". "
         (most_lost(table, point))
-        @if r.converged { " The " (words::link("reference", "reference")) " has converged: errors of " (percent(r.resolution)) " and more are significant." }
-        @else { " The " (words::link("reference", "reference")) " " (lacks) ": errors below " (percent(r.resolution)) " are not significant." }
+        @if r.converged { " The " (words::link("reference", "reference")) " has converged: only errors below " (percent(r.resolution)) " may be noise." }
+        @else { " The " (words::link("reference", "reference")) " " (lacks) ": errors below " (percent(r.resolution)) " may be noise." }
         @if !seen { " No knob changes this picture visibly." }
     }
 }
@@ -114,7 +114,7 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
     Ok(html! {
         section #settings {
             h2 { "Recommended settings" }
-            p { "Each setting is a list of choices, as in refraction=off: a " (words::link("rung", "knob and its rung")) ". " b { "quick" } " is the fastest, or a slower one with far less error for less than twice its time. " b { "balanced" } " has at most " (plain(WORTH)) " times the least error that " (plain(DEARER)) " times the time of quick can buy. " b { "exact" } " has the least error, whatever its time. In parentheses is the error that a more exact choice takes away. Errors add by their squares, so these do not sum to the whole." }
+            p { "Each setting is a list of choices, as in refraction=off: a " (words::link("rung", "knob and its rung")) ". " b { "quick" } " is the fastest, or a slower one with far less error for less than twice its time. " b { "balanced" } " has nearly the least error (within " (plain(100.0 * (WORTH - 1.0))) " %) that " (plain(DEARER)) " times the time of quick can buy. " b { "exact" } " has the least error, whatever its time. In parentheses is the error that a more exact choice takes away; these do not add up to the whole." }
             div.settings { @for card in &cards { (card) } }
         }
     })
@@ -186,8 +186,8 @@ fn lost(table: &Table, point: &Point) -> Markup {
     };
     let rest: Vec<Simplified<'_>> = rest.iter().map(|(choice, _)| *choice).collect();
     html! {
-        @if point.name == REFERENCE && table.reference.lacks_bands() { "bands of wavelengths; it has noise" }
-        @else if point.name == REFERENCE { "nothing, but it has noise" }
+        @if point.name == REFERENCE && table.reference.lacks_bands() { "bands of wavelengths; and it has noise" }
+        @else if point.name == REFERENCE { "nothing; it has only noise" }
         @else if all.is_empty() { "nothing" }
         @else if told.is_empty() && all.iter().all(|choice| choice.loss.is_some()) { "nothing that is visible here" }
         @else if told.is_empty() { "not known" }
