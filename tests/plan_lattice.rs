@@ -499,7 +499,7 @@ fn compilers_spill_no_register() {
             }
         }
     }
-    // What all programs of a lattice have in common is not worth a line.
+    // Programs whose kernels are all small have no line in the file.
     largest.retain(|_, most| most.registers > 128 || most.code_bytes > 32 << 10);
     eprintln!("{device}: of {told} kernels more than 128 registers or 32 KB of code have {largest:?}");
     assert!(told > 2000 && in_memory.is_empty(), "{device}: {told} kernels, in memory: {in_memory:#?}");

@@ -91,10 +91,8 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let clock = TimeNoise::of([(&measured.ms[..], &measured.baseline_ms[..])].into_iter());
     let turns = PairedTimes { ms: &measured.ms, baseline_ms: &measured.baseline_ms, clock };
     let family = if more.is_some() { Family::Local } else { Family::Exact };
-    let mut price = price(&change, (&pair, family), more, turns, STATEMENTS, standard_errors(STATEMENTS, MANY));
-    if price.is_wasted() {
-        price.verdict += ": wasted here";
-    }
+    let price = price(&change, (&pair, family), more, turns, STATEMENTS, standard_errors(STATEMENTS, MANY))
+        .says_where_wasted("here");
     Ok(Compared {
         knob: knob.name,
         rungs,

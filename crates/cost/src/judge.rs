@@ -146,14 +146,13 @@ impl Judge<'_> {
             let clock = clocks[usize::from(!local)];
             let [ms, baseline_ms] = in_the_middle([&record.ms, &record.baseline_ms], points[base].gpu_ms.median);
             let turns = PairedTimes { ms: &ms, baseline_ms: &baseline_ms, clock };
-            let mut price = price(change, (pair, record.family), more, turns, statements, sure);
-            price.point = record.name.clone();
-            price.flip_delta = points[i].errors.flip_mean - points[base].errors.flip_mean;
-            if price.is_wasted() {
-                // What `local` leaves out may be what the knob is about: dispersion, where nothing is refracted.
-                price.verdict += if local { ": wasted in local" } else { ": wasted here" };
-            }
-            prices.push(price);
+            // What `local` leaves out may be what the knob is about: dispersion, where nothing is refracted.
+            let place = if local { "in local" } else { "here" };
+            prices.push(Price {
+                point: record.name.clone(),
+                flip_delta: points[i].errors.flip_mean - points[base].errors.flip_mean,
+                ..price(change, (pair, record.family), more, turns, statements, sure).says_where_wasted(place)
+            });
         }
         let frontier = self.frontier(&points, &displays, sure, |_| true);
         // `local` with one knob changed may owe its place to two errors that cancel.

@@ -397,6 +397,14 @@ impl Price {
         self.takes_longer() && !nearer && unseen
     }
 
+    /// With the place added to the verdict where the change is wasted.
+    pub(super) fn says_where_wasted(mut self, place: &str) -> Self {
+        if self.is_wasted() {
+            self.verdict += &format!(": wasted {place}");
+        }
+        self
+    }
+
     /// Whether the change takes significantly longer than the base.
     #[must_use]
     pub fn takes_longer(&self) -> bool {
