@@ -117,17 +117,24 @@ fn near_distance(eye: DVec3, bounds: Option<Bounds>) -> f64 {
     (0.5 * outside).max(1e-5 * radius)
 }
 
-/// Sub-pixel offset in (−0.5, 0.5)² of sample `index` of `count`: the centre for a single sample, otherwise the R2
-/// low-discrepancy sequence (Roberts 2018), which covers the pixel evenly for any count. Box reconstruction filter.
+/// Sub-pixel offset in (−0.5, 0.5)² of sample `index` of `count`: the first two dimensions of Sobol's sequence, in the
+/// middles of the squares of which each row and each column of `count` has one. So the mean of all is the pixel's
+/// centre: edges do not move. (With the R2 sequence of Roberts 2018 four samples were 0.14 pixels beside it.) Box
+/// reconstruction filter.
 #[must_use]
 pub fn jitter(index: u32, count: u32) -> DVec2 {
-    if count == 1 {
-        return DVec2::ZERO;
+    let bits = count.next_power_of_two().ilog2();
+    // The generator matrix of the second dimension is Pascal's triangle modulo 2: each column is the one before, XOR
+    // itself shifted.
+    let mut column = 1_u32 << 31;
+    let mut y = 0;
+    for bit in 0..bits {
+        y ^= if index >> bit & 1 != 0 { column } else { 0 };
+        column ^= column >> 1;
     }
-    // Powers of the inverse of the plastic number, the root of x³ = x + 1.
-    const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
-    let at = DVec2::splat(0.5) + STEP * f64::from(index + 1);
-    at - at.floor() - 0.5
+    let squares = f64::from(count.next_power_of_two());
+    let middle = |word: u32| f64::from(word) / 2_f64.powi(32) + 0.5 / squares - 0.5;
+    DVec2::new(middle(index.reverse_bits()), middle(y))
 }
 
 #[cfg(test)]
@@ -187,12 +194,21 @@ mod tests {
 
     #[test]
     fn jitters_fill_the_pixel_evenly() {
-        for count in [4, 16, 64, 256] {
+        for count in [1, 4, 16, 64, 256] {
             let all: Vec<_> = (0..count).map(|i| jitter(i, count)).collect();
             let mean = all.iter().sum::<DVec2>() / f64::from(count);
-            assert!(mean.length() < 0.6 / f64::from(count).sqrt(), "{count}: {mean}");
-            assert!(all.iter().all(|j| j.abs().max_element() <= 0.5));
+            assert!(mean.length() < 1e-12, "{count}: {mean}");
+            for axis in 0..2 {
+                let mut rows: Vec<_> = all.iter().map(|at| ((at[axis] + 0.5) * f64::from(count)) as u32).collect();
+                rows.sort_unstable();
+                assert!(rows.into_iter().eq(0..count), "{count}: one in each row and column");
+            }
+            // A quarter of the samples lies in each quarter of the pixel, at any time.
+            for four in all.as_chunks::<4>().0 {
+                let mut quarters = four.map(|at| (at.x > 0.0, at.y > 0.0));
+                quarters.sort_unstable();
+                assert!(quarters.windows(2).all(|pair| pair[0] != pair[1]), "{count}: {four:?}");
+            }
         }
-        assert_eq!(jitter(0, 1), DVec2::ZERO);
     }
 }
