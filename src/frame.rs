@@ -53,7 +53,7 @@ use crate::scene::environment::Environment;
 use crate::scene::wavelengths::Slice;
 use crate::share;
 use crate::spectra::VISIBLE;
-use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation, sky_directions};
+use crate::upload::environment::{EnvironmentOnDevice, EnvironmentRotation};
 use crate::upload::rays::{BvhFacts, RaysOnDevice};
 use crate::upload::scene::SceneOnDevice;
 use crate::upload::shared::{Library, OnDevice};
@@ -83,8 +83,6 @@ pub struct Renderer {
     rays: RaysOnDevice,
     shadow_maps: ShadowMaps,
     environment: EnvironmentOnDevice,
-    /// Directions of ambient occlusion.
-    sky_directions: Option<Buffer>,
     targets: Targets,
     camera: Buffer,
     /// The scene's descriptor sets, which all programs read.
@@ -172,8 +170,6 @@ impl Renderer {
             rotation: settings.environment_rotation,
             blur: settings.background_blur,
         };
-        let sky = environment.or(dark.as_ref()).map(|map| settings.sky(map));
-        let sky_directions = sky_directions(device, &plan, sky, settings.seed)?;
         let touching = rays.constants.touching;
         // If both plans draw the same work, targets and environment are reused.
         let (textures, around, targets) = match before {
@@ -186,7 +182,7 @@ impl Renderer {
         let mut scene = SceneOnDevice::new(device, scene, &plan, &settings.knobs, &solids, rays.anchor(), textures)?;
         let environment = match around {
             Some(around) => around,
-            None => EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn)?,
+            None => EnvironmentOnDevice::new(device, &plan, environment.or(dark.as_ref()), turn, settings.seed)?,
         };
         let shadow_maps = ShadowMaps::new(device, &plan, &name, &mut scene, rays.anchor())?;
         let camera = Buffer::new(device, "camera", size_of::<share::Camera>() as u64, Place::Upload)?;
@@ -200,7 +196,6 @@ impl Renderer {
         Ok(Self {
             sets: on_device.write(device)?,
             environment,
-            sky_directions,
             shadow_maps,
             scene,
             rays,
@@ -557,8 +552,8 @@ impl Renderer {
             classify(&mut frame, library, plan.architecture, g, work)?;
         }
         light(&mut frame, lighting, g, work, radiance)?;
-        if let Some(directions) = &self.sky_directions {
-            ambient(&mut frame, lighting, g, work, directions, radiance)?;
+        if plan.occlusion_rays() > 0 {
+            ambient(&mut frame, lighting, g, work, radiance)?;
         }
         background(&mut frame, lighting, g, work, radiance)?;
         let trees = (&self.targets.ray_tiles, self.targets.ray_trees.as_ref());

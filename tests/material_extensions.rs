@@ -420,6 +420,25 @@ fn a_white_leaf_vanishes_in_uniform_light() {
     }
 }
 
+/// A closed shade in uniform light E₀: its inside has E = τ E₀ + ρ E, and its outside shows ρ E₀ + τ E.
+#[test]
+fn a_shade_is_lit_through_its_own_walls() {
+    let gpu = Gpu::open();
+    let sky = Environment::constant([0.5; 3]);
+    let mut made = Made::new("shade");
+    let paper = leaf(0.5, [0.8; 3], Material { double_sided: true, ..lambert([0.9; 3]) });
+    made.add(Shape::sphere(1.0, 24), paper, DAffine3::IDENTITY);
+    made.front(0.3);
+    let (back, through) = (0.45, 0.4);
+    let want = 0.5 * (back + through * through / (1.0 - back));
+    // Without visibility it would be 0.5 (ρ + τ), 18 % more.
+    for (of, samples, bound) in [(Model::Recursive, 4, 1e-4), (Model::Global, 256, 0.01)] {
+        let (_, film) = gpu.shot(&made.0, Some(&sky), model(of, [16, 16], &[&format!("samples={samples}")]));
+        let mean = film.rgba.iter().map(|pixel| f64::from(pixel[0])).sum::<f64>() / film.rgba.len() as f64;
+        assert!((mean / want - 1.0).abs() < bound, "{of:?}: {mean}, not {want}");
+    }
+}
+
 /// The background does not count as light straight ahead, but light from behind that scatters in a leaf does.
 #[test]
 fn light_from_behind_shines_through_leaves_before_a_transparent_background() {

@@ -1,12 +1,15 @@
 // Ray-traced ambient occlusion: light of the environment on a surface, with the visibility of the environment.
-// 1. Irradiance. Directions l are drawn from the environment's radiance and from the sphere, once for all pixels
-//    (src/transport/sky_directions.rs), with weights w = L/p. Σ w cos θ V / Σ w cos θ is the share of the irradiance that
-//    arrives; it multiplies the irradiance without occluders. The ratio is 1 where nothing occludes, whatever the
-//    directions are, and neighbouring pixels have no noise between them.
+// 1. Irradiance. Directions l are the middles of regions of the environment, once for all pixels: a median cut
+//    (src/transport/sky_directions.rs), with the regions' power as weights w. Σ w cos θ V / Σ w cos θ is the share of the
+//    irradiance that arrives; it multiplies the irradiance without occluders. The ratio is 1 where nothing occludes,
+//    whatever the directions are, and neighbouring pixels have no noise between them.
 // 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
 //    radiance (split sum).
 // 3. Interreflection. What occludes the share O of the directions is taken to face this surface, to have the same albedo ρ,
 //    and to have the same share occluded by this surface, as inside a concavity: E = V E₀ + ρ O E', E' = (1 − O) E₀' + ρ O E.
+// 4. Light from behind, which a surface transmits diffusely. What occludes its back is taken to be of the same material, as
+//    the other walls of a lampshade: it lets E₀ through, by its albedo τ of diffuse transmission, and gives back what
+//    arrives there. E = V E₀ + (1 − V)(τ E₀ + ρ E).
 // Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities).
 // Assumes: bvh space, metres; a compensated surface.
 #ifndef AMBIENT_OCCLUSION_GLSL
@@ -17,54 +20,81 @@
 #include "lib/shadow.glsl"
 #include "share/sky_direction.glsl"
 
-layout(constant) const uint OCCLUSION_RAYS = 1; // for each sample of a pixel
+layout(constant) const uint OCCLUSION_RAYS = 1;    // of a surface, for each sample of a pixel
+layout(constant) const uint SAMPLE_DIRECTIONS = 1; // of the sample: as many, or more of which a surface has a part
 layout(constant) const uint LOBE_RAYS = 1;      // in each specular lobe; 0: lobes are not occluded
 
-layout(pass, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
+layout(scene, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
 
 // Events of the random numbers, after those of reflection and refraction. All pixels have the same numbers.
 const uint BASE_LOBE_EVENT = 0x400u;
 const uint COAT_LOBE_EVENT = 0x401u;
 
-vec3 visibility_of_environment(Surface s, vec3 direction, bool wanted) {
-    return visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, direction, LARGEST, wanted);
-}
-
-struct VisibleIrradiance {
-    vec3 share;              // of the irradiance that arrives
-    vec3 occluded_share;     // of the directions, by cosine and solid angle
+// What the directions so far have shown: sums that are shares at the end.
+struct SkyShown {
+    vec3 seen;               // light that arrives
+    vec3 all;                // and without occluders
+    vec3 occluded;           // by cosine and solid angle
     vec3 occluded_direction; // sum of the occluded directions
+    float hemisphere;
+    vec3 seen_behind; // on the other side, where the surface transmits diffusely
+    vec3 all_behind;
+};
+const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0, vec3(0.0), vec3(0.0));
+
+// One of the directions, as a surface has it.
+struct SkyRay {
+    SkyDirection sky;
+    float side;  // 1 the viewer's, -1 the other one
+    float cos_l; // 0 where it is not wanted
 };
 
-// Directions between the triangle's plane and that of the interpolated normal count nowhere: a smooth convex mesh does not
-// occlude itself.
-VisibleIrradiance visible_irradiance(Surface s) {
-    vec3 seen = vec3(0.0);
-    vec3 all = vec3(0.0);
-    vec3 occluded = vec3(0.0);
-    vec3 occluded_direction = vec3(0.0);
-    float hemisphere = 0.0;
-    // Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass takes 3
-    // to 6 % longer.
-    for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
-        SkyDirection sky = sky_directions[trace_terms.sample_index * OCCLUSION_RAYS + i];
-        float cos_l = dot(s.n_triangle, sky.direction) > 0.0 ? max(dot(s.n, sky.direction), 0.0) : 0.0;
-        vec3 weight = light_of_environment(sky.weight) * cos_l;
-        vec3 visible = visibility_of_environment(s, sky.direction, cos_l > 0.0);
-        seen += weight * visible;
-        all += weight;
-        float projected = cos_l * sky.solid_angle;
-        hemisphere += projected;
-        // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
-        vec3 hidden = 1.0 - visible;
-        occluded += projected * hidden;
-        occluded_direction += sky.direction * (projected * mean(hidden));
-    }
-    VisibleIrradiance r;
-    r.share = mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
-    r.occluded_share = occluded / max(hemisphere, 1e-30);
-    r.occluded_direction = occluded_direction;
+// Direction `i` of a surface. Those between the triangle's plane and that of the interpolated normal count nowhere: a smooth
+// convex mesh does not occlude itself.
+SkyRay sky_ray(Surface s, uint i) {
+    SkyRay r;
+    // A quarter of them for each sample: four samples have those of four different places, all over the sphere together.
+    uint first = trace_terms.sample_index * OCCLUSION_RAYS % SAMPLE_DIRECTIONS;
+    r.sky = sky_directions[trace_terms.sample_index * SAMPLE_DIRECTIONS + first + i];
+    bool shines_through = DIFFUSE_TRANSMISSION && largest(s.diffuse_through) > 0.0;
+    r.side = shines_through && dot(s.n_triangle, r.sky.direction) < 0.0 ? -1.0 : 1.0;
+    r.cos_l = dot(s.n_triangle, r.sky.direction) * r.side > 0.0 ? max(dot(s.n, r.sky.direction) * r.side, 0.0) : 0.0;
     return r;
+}
+
+// On which side the ray leaves the surface.
+vec3 free_side(Surface s, SkyRay r) {
+    return DIFFUSE_TRANSMISSION && r.side < 0.0 ? reflect(s.v, s.n_triangle) : s.v;
+}
+
+void show(inout SkyShown shown, SkyRay r, vec3 visible) {
+    vec3 weight = light_of_environment(r.sky.weight) * r.cos_l;
+    float projected = r.cos_l * r.sky.solid_angle;
+    if (DIFFUSE_TRANSMISSION && r.side < 0.0) {
+        shown.seen_behind += weight * visible;
+        shown.all_behind += weight;
+        weight = vec3(0.0);
+        projected = 0.0;
+    }
+    shown.seen += weight * visible;
+    shown.all += weight;
+    shown.hemisphere += projected;
+    // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
+    vec3 hidden = 1.0 - visible;
+    shown.occluded += projected * hidden;
+    shown.occluded_direction += r.sky.direction * (projected * mean(hidden));
+}
+
+// Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass
+// takes 3 to 6 % longer.
+SkyShown shown_to(Surface s) {
+    SkyShown shown = NOTHING_SHOWN;
+    for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
+        SkyRay r = sky_ray(s, i);
+        vec3 n = s.n_triangle * r.side;
+        show(shown, r, visibility(s.p_bvh, n, free_side(s, r), s.face, s.media, r.sky.direction, LARGEST, r.cos_l > 0.0));
+    }
+    return shown;
 }
 
 // Share of a specular lobe that sees the environment, by the weights of its directions. An anisotropic lobe counts as a
@@ -77,7 +107,7 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
         vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
         vec3 r = reflect_ray(-s.v, h).R;
         float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
-        seen += weight * visibility_of_environment(s, r, weight > 0.0);
+        seen += weight * visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, weight > 0.0);
         all += weight;
     }
     return all > 0.0 ? seen / all : vec3(1.0);
@@ -101,38 +131,69 @@ vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
     return sum;
 }
 
+vec3 share_of(vec3 seen, vec3 all) {
+    return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+}
+
+// What a surface makes of the light that the directions have shown to it.
+struct OccludedLight {
+    vec3 diffuse; // radiance to the eye
+    vec3 beside;  // radiance of what occludes
+};
+
+OccludedLight occluded_light(Surface s, EnvironmentFactors factors, SkyShown shown) {
+    precise vec3 kept = min(factors.albedo, 0.98);
+    precise vec3 occluded_share = shown.occluded / max(shown.hemisphere, 1e-30);
+    precise vec3 here = environment_irradiance(s.n) * share_of(shown.seen, shown.all);
+    // What occludes faces this surface, and is taken to be as open.
+    float size2 = dot(shown.occluded_direction, shown.occluded_direction);
+    precise vec3 there = environment_irradiance(size2 > 0.0 ? -shown.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - occluded_share);
+    precise vec3 given_back = kept * occluded_share;
+    if (DIFFUSE_TRANSMISSION) {
+        vec3 open = share_of(shown.seen_behind, shown.all_behind);
+        precise vec3 shut = 1.0 - open;
+        precise vec3 arriving = open + shut * s.diffuse_through;
+        factors.through *= arriving / (1.0 - shut * min(s.diffuse, 0.98));
+    }
+    OccludedLight r;
+    r.diffuse = diffuse_environment_light(factors, exchanged_irradiance(here, there, given_back));
+    r.beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;
+    return r;
+}
+
 // All that needs the layers is evaluated before rays are traced, and light is summed as soon as it is known: what is kept until later
 // takes registers from the rays.
 vec3 occluded_environment_light(Surface s) {
     EnvironmentFactors factors = environment_factors(s, layer_albedo(s, albedo_of_base(s)));
-    precise vec3 kept = min(factors.albedo, 0.98);
     vec3 mirrored = vec3(0.0);
     vec3 coat_mirrored = vec3(0.0);
     if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
     if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = radiance_in_coat_lobe(s);
-    VisibleIrradiance seen = visible_irradiance(s);
-    precise vec3 here = environment_irradiance(s.n) * seen.share;
-    // What occludes faces this surface, and is taken to be as open.
-    float size2 = dot(seen.occluded_direction, seen.occluded_direction);
-    precise vec3 there = environment_irradiance(size2 > 0.0 ? -seen.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - seen.occluded_share);
-    precise vec3 given_back = kept * seen.occluded_share;
-    vec3 result = diffuse_environment_light(factors, exchanged_irradiance(here, there, given_back));
+    OccludedLight light = occluded_light(s, factors, shown_to(s));
+    vec3 result = light.diffuse;
     if (!REFLECTION) return result;
-    // The radiance of what occludes.
-    precise vec3 beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;
     if (LOBE_RAYS > 0) {
         // First the base, then the coat, in a loop: the code that traces lobes exists once.
         for (uint i = 0; i < (CLEARCOAT ? 2u : 1u); i++) {
             bool coat = CLEARCOAT && i == 1;
             if (coat ? !s.coat_traced : !s.base_traced) {
                 vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
-                if (coat) coat_mirrored = partly_occluded(coat_mirrored, beside, visible);
-                else mirrored = partly_occluded(mirrored, beside, visible);
+                if (coat) coat_mirrored = partly_occluded(coat_mirrored, light.beside, visible);
+                else mirrored = partly_occluded(mirrored, light.beside, visible);
             }
         }
     }
     result += factors.base_lobe * mirrored;
     if (CLEARCOAT) result += factors.coat_lobe * coat_mirrored;
     return result;
+}
+
+// At a surface that a ray meets: the lobes see the whole environment.
+vec3 environment_light_at_hit(Surface s, SkyShown shown) {
+    EnvironmentFactors factors = environment_factors(s, layer_albedo(s, albedo_of_base(s)));
+    precise vec3 result = occluded_light(s, factors, shown).diffuse;
+    if (REFLECTION && !s.base_traced) result += factors.base_lobe * radiance_in_base_lobe(s);
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) result += factors.coat_lobe * radiance_in_coat_lobe(s);
+    return s.unlit ? vec3(0.0) : result;
 }
 #endif

@@ -14,7 +14,7 @@ struct EnvironmentFactors {
     vec3 scattered;
     vec3 base_lobe;
     float coat_lobe;
-    vec3 through; // the radiance to the eye of light from behind, which has no visibility
+    vec3 through; // the radiance to the eye of light from behind, without visibility
     vec3 albedo;  // of all below the coat
 };
 

@@ -1,11 +1,12 @@
 // Ray trees in steps: what the kernels of reflection and refraction on GPUs leave for each other in memory.
 // As many trees grow at the same time as there is memory for. In each step every tree follows one branch, the last one of
 // its stack, and a tree that is complete makes room for that of another pixel (path regeneration). So all invocations have
-// work until the last pixels. A step is five dispatches over queues of trees: interact_begin.comp writes the light of
+// work until the last pixels. A step is six dispatches over queues of trees: interact_begin.comp writes the light of
 // complete trees and begins those of other pixels; interact_extend.comp traces the branches; interact_sample.comp draws a
-// light sample at the surfaces that they meet; interact_light.comp lights these; interact_split.comp splits the branches
-// there. So most kernels trace, or search lights, or shade, and need the registers of one of these. The host repeats STEPS
-// steps until no tree is left; interact_next.comp moves the queues' sizes from the last to the first.
+// light sample at the surfaces that they meet; interact_light.comp lights these; interact_ambient.comp adds the
+// environment's light with visibility; interact_split.comp splits the branches there. So most kernels trace, or search
+// lights, or shade, and need the registers of one of these. The host repeats STEPS steps until no tree is left;
+// interact_next.comp moves the queues' sizes from the last to the first.
 // The order within a queue varies from run to run. Each tree adds to its own pixel alone, in its own order, so the picture
 // does not.
 // Where to read: Laine, Karras and Aila, Megakernels Considered Harmful, HPG 2013; Novák, Havran and Dachsbacher, Path

@@ -4,6 +4,7 @@
 // and 20.3; pbrt 4, section 13.3. Assumes: world axes, positions relative to the eye, metres.
 #ifndef LIGHTING_GLSL
 #define LIGHTING_GLSL
+#include "lib/ambient_occlusion.glsl"
 #include "lib/emitters.glsl"
 #include "lib/encode.glsl"
 #include "lib/environment_light.glsl"
@@ -64,11 +65,17 @@ Layers without_mirrors(Layers b, uint surface) {
     return b;
 }
 
-// Radiance that light `index` of the table adds, with its shadow; where `is_sample`, that of a light sample.
-vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
+// Rays of ambient occlusion that the loop over lights traces too, last: the code that traces exists once in a kernel.
+layout(constant) const uint SKY_RAYS = 0;
+// What they have shown to the last surface.
+SkyShown sky_shown = NOTHING_SHOWN;
+
+// Radiance that light `index` of the table adds, with its shadow; where `is_sample`, that of a light sample. Where `is_sky`
+// it is a ray of ambient occlusion, which adds to `sky_shown` instead.
+vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, uint surface) {
     Surface s = b.s;
     vec3 p_rel = LIT_AT_HITS ? s.p_bvh - trace_terms.bvh_from_rel : s.p_rel;
-    PunctualLight light = punctual_light_at(is_sample ? 0u : index, p_rel);
+    PunctualLight light = punctual_light_at(is_sample || is_sky ? 0u : index, p_rel);
     if (LIGHT_SAMPLES > 0) {
         if (is_sample) {
             LightSample drawn;
@@ -83,6 +90,11 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
             if (EMISSIVE_TRIANGLES && drawn.pdf > 0.0) b = without_mirrors(b, surface);
         }
     }
+    SkyRay sky;
+    if (SKY_RAYS > 0) {
+        sky = sky_ray(s, is_sky ? index : 0u);
+        if (is_sky) light = PunctualLight(sky.sky.direction, sky.sky.direction, vec3(0.0), true);
+    }
     vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
     if (DIFFUSE_TRANSMISSION) {
         // Light from behind: seen from there, the surface is turned over.
@@ -96,24 +108,33 @@ vec3 light_on(Layers b, uint index, bool is_sample, uvec2 pixel, uint surface) {
             if (LIGHT_SAMPLES > 0 && is_sample) light.to_light += front - ray_origin(s.p_bvh, s.n_triangle, s.v);
         }
     }
-    if (SHADOWS != 0) {
-        result *= terminator(s.n, s.n_triangle, light.l);
+    if (SKY_RAYS > 0 && is_sky) {
+        s.v = free_side(s, sky);
+        s.n_triangle *= sky.side;
+    }
+    if (SHADOWS != 0 || SKY_RAYS > 0) {
+        if (SHADOWS != 0) result *= terminator(s.n, s.n_triangle, light.l);
         // NaN is wanted too: the film counts it.
-        bool wanted = !(largest(result) <= FAINTEST_LOBE * largest(light.arriving));
-        if (SHADOWS == SHADOW_MAP && !(LIGHT_SAMPLES > 0 && is_sample)) {
+        bool wanted = SHADOWS != 0 && !(largest(result) <= FAINTEST_LOBE * largest(light.arriving));
+        if (SKY_RAYS > 0) wanted = is_sky ? sky.cos_l > 0.0 : wanted;
+        if (SHADOWS == SHADOW_MAP && !(LIGHT_SAMPLES > 0 && is_sample) && !(SKY_RAYS > 0 && is_sky)) {
             float share = map_visibility(s.p_bvh, s.n_triangle, light.to_light, index, largest_component(p_rel));
             return wanted ? result * share : vec3(0.0);
         }
         // From p_bvh, the point on the triangle: p_rel may come from depth (lib/primary.glsl).
         vec3 to_light = light.to_light;
         if (!LIT_AT_HITS && !light.directional && !is_sample) to_light += p_rel - (s.p_bvh - trace_terms.bvh_from_rel);
-        result *= visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, to_light, light.directional ? LARGEST : 1.0, wanted);
+        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, to_light, light.directional ? LARGEST : 1.0, wanted);
+        if (SKY_RAYS > 0) {
+            if (is_sky) show(sky_shown, sky, visible);
+        }
+        if (SHADOWS != 0) result *= visible;
     }
     return result;
 }
 
-// The lights of one dispatch: indices in the order directional lights, light samples, point and spot lights; and words of
-// the tiles' bit masks.
+// The lights of one dispatch: indices in the order directional lights, light samples, point and spot lights, rays of ambient
+// occlusion; and words of the tiles' bit masks.
 struct LightRange {
     uint first;
     uint end;
@@ -135,7 +156,8 @@ uint samples_cut_off = 0;
 // `surface` is the number of the surface, for the random numbers.
 vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
     vec3 sum = vec3(0.0);
-    if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + TILE_WORDS == 0) return sum;
+    if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + SKY_RAYS + TILE_WORDS == 0) return sum;
+    if (SKY_RAYS > 0) sky_shown = NOTHING_SHOWN;
     if (VECTORS_WAIT) light_waiting[waiting_word(WAITING_FROM_LIGHTS, 0)] = sum;
     // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
     // the body of a loop at least once, and the body for a light is long.
@@ -152,17 +174,19 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
             }
         }
         bool out_of_steps = loop_iterations > LIGHT_BUDGET && !(listed && bits == 0);
-        bool only_samples = LOCAL_LIGHTS + TILE_WORDS == 0 && next >= DIRECTIONAL_LIGHTS;
+        bool is_sky = SKY_RAYS > 0 && !listed && next >= DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS;
+        bool only_samples = is_sky || (LOCAL_LIGHTS + TILE_WORDS == 0 && next >= DIRECTIONAL_LIGHTS);
         lights_cut_off += out_of_steps && !only_samples ? 1u : 0u;
         samples_cut_off += out_of_steps && only_samples ? 1u : 0u;
         if (out_of_steps || (listed && bits == 0)) break;
         bool is_sample = !listed && next >= DIRECTIONAL_LIGHTS && next < DIRECTIONAL_LIGHTS + LIGHT_SAMPLES;
         uint in_group = is_sample ? next - DIRECTIONAL_LIGHTS : next < DIRECTIONAL_LIGHTS ? next : next - LIGHT_SAMPLES;
+        if (is_sky) in_group = next - (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS);
         uint index = listed ? DIRECTIONAL_LIGHTS + word * 32 + uint(findLSB(bits)) : in_group;
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;
         b = in_turn(b, index);
-        vec3 light = light_on(b, index, is_sample, uvec2(pixel), surface);
+        vec3 light = light_on(b, index, is_sample, is_sky, uvec2(pixel), surface);
         if (VECTORS_WAIT) {
             light_waiting[waiting_word(WAITING_FROM_LIGHTS, index)] += light;
         } else {
@@ -172,13 +196,16 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
     return VECTORS_WAIT ? light_waiting[waiting_word(WAITING_FROM_LIGHTS, next)] : sum;
 }
 
+// The environment's light is added apart, with visibility (lib/ambient_occlusion.glsl).
+layout(constant) const bool ENVIRONMENT_APART = false;
+
 // Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
 // environment.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, LightRange range, bool all_around) {
     LayerAlbedo albedo = layer_albedo(s, albedo_of_base(s));
     // Before the lights: afterwards the albedos would take registers while shadow rays are traced.
     vec3 around = s.emissive * under_coat(s);
-    if (AMBIENT || REFLECTION) around += environment_light(s, albedo);
+    if ((AMBIENT || REFLECTION) && !ENVIRONMENT_APART) around += environment_light(s, albedo);
     if (VECTORS_WAIT) light_waiting[waiting_word(WAITING_FROM_AROUND, 0)] = around;
     vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
     if (VECTORS_WAIT) around = light_waiting[waiting_word(WAITING_FROM_AROUND, shadow_rays)];

@@ -143,7 +143,7 @@ Surface surface_for_lights(HitSurface hit, Boundary boundary, uint leaf) {
 
 // Every light: hits are outside of the light tiles.
 LightRange all_lights() {
-    return LightRange(0, DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS, 0, 0);
+    return LightRange(0, DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + SKY_RAYS, 0, 0);
 }
 
 // Flag in the event number that gives coats random numbers of their own.

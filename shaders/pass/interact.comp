@@ -124,6 +124,11 @@ void main() {
                 uint surface = reflection_rays + refraction_rays;
                 split(hit, boundary, ray, cone, uvec2(pixel), surface);
                 if (lit) sum += weight * radiance_to_eye(s, pixel, surface, 0, all_lights(), true);
+                if (ENVIRONMENT_APART) {
+                    precise vec3 around_here = weight * environment_light_at_hit(s, sky_shown);
+                    precise vec3 with_it = sum + around_here;
+                    if (lit) sum = with_it;
+                }
                 // Without its light samples the surface is too dark.
                 lost += samples_cut_off > 0 ? largest(ray.throughput) : 0.0;
                 samples_cut_off = 0;

@@ -1,4 +1,4 @@
-// Reflection and refraction in steps, 1 of 5: writes the light of complete ray trees into the picture, and begins the trees of
+// Reflection and refraction in steps, 1 of 6: writes the light of complete ray trees into the picture, and begins the trees of
 // other pixels: the branches of their primary surfaces, from the G-buffer.
 // Where to read: lib/interact_steps.glsl.
 #version 460

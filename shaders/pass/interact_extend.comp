@@ -1,4 +1,4 @@
-// Reflection and refraction in steps, 2 of 5: traces the last branch of each ray tree. One that leaves the scene ends here.
+// Reflection and refraction in steps, 2 of 6: traces the last branch of each ray tree. One that leaves the scene ends here.
 // Where to read: lib/interact_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require

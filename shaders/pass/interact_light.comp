@@ -1,4 +1,4 @@
-// Reflection and refraction in steps, 4 of 5: lights the surface that the last branch of each ray tree has met.
+// Reflection and refraction in steps, 4 of 6: lights the surface that the last branch of each ray tree has met.
 // Where to read: lib/interact_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require

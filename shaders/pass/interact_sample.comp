@@ -1,4 +1,4 @@
-// Reflection and refraction in steps, 3 of 5: draws the first light sample at the surface that the last branch of each ray tree
+// Reflection and refraction in steps, 3 of 6: draws the first light sample at the surface that the last branch of each ray tree
 // has met (next event estimation).
 // Where to read: lib/interact_steps.glsl.
 #version 460

@@ -1,4 +1,4 @@
-// Reflection and refraction in steps, 5 of 5: splits the last branch of each ray tree at the surface that it has met.
+// Reflection and refraction in steps, 6 of 6: splits the last branch of each ray tree at the surface that it has met.
 // Where to read: lib/interact_steps.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require

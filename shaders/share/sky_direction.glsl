@@ -3,7 +3,7 @@
 #define SHARE_SKY_DIRECTION_GLSL
 struct SkyDirection {
     vec3 direction; // world axes
-    vec3 weight;    // radiance over the density of the direction
-    float solid_angle; // 1 over that density
+    vec3 weight;    // radiance times solid angle of its region, times the number of directions
+    float solid_angle; // of the region, times the number of directions
 };
 #endif

@@ -7,7 +7,7 @@ use anyhow::Result;
 use super::classify::WorkLists;
 use super::gbuffer::GBuffer;
 use super::lighting::Lighting;
-use crate::gpu::{Buffer, Frame, Image};
+use crate::gpu::{Frame, Image};
 use crate::shader::ambient;
 
 /// Adds the environment's light to `radiance` at pixels with a surface, by indirect dispatch over the list of surface
@@ -20,16 +20,9 @@ pub fn ambient<'a>(
     lighting: &Lighting<'a>,
     gbuffer: &'a GBuffer,
     work: &'a WorkLists,
-    sky_directions: &'a Buffer,
     radiance: &'a Image,
 ) -> Result<()> {
-    let bind = ambient::Bind {
-        gbuffer: gbuffer.bind(),
-        ambient_occlusion: crate::shader::lib::ambient_occlusion::Bind { sky_directions },
-        radiance,
-        surface_tiles: &work.surface,
-        work: &work.sizes,
-    };
+    let bind = ambient::Bind { gbuffer: gbuffer.bind(), radiance, surface_tiles: &work.surface, work: &work.sizes };
     let mut library = lighting.library;
     // Rays start on the triangles. Lights with shadow maps are looked up from depth, whether or not there is this pass.
     library.gbuffer.stored_triangles = true;

@@ -15,7 +15,8 @@ use crate::gpu::{Frame, Image};
 use crate::plan::Rays;
 use crate::shader::interact;
 
-/// Light samples of a primary surface for each of a surface that a ray meets (docs/decisions/light-samples.md).
+/// Light samples of a primary surface, and rays of ambient occlusion, for each of a surface that a ray meets
+/// (docs/decisions/light-samples.md).
 const FEWER_AT_HITS: u32 = 4;
 
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
@@ -46,10 +47,13 @@ pub fn interact<'a>(
     library.gbuffer.stored_triangles = true;
     // Many surfaces that rays meet share a pixel.
     library.emitters.light_samples = library.emitters.light_samples.div_ceil(FEWER_AT_HITS);
+    library.ambient_occlusion.occlusion_rays = library.ambient_occlusion.occlusion_rays.div_ceil(FEWER_AT_HITS);
+    library.lighting.environment_apart = lighting.plan.occlusion_rays() > 0;
     library.ray_tree.first_event = part.map_or(0, |part| part as u32);
     if let Some(trees) = trees {
         return trees.grow(frame, &name, (lighting, library), gbuffer, tiles, radiance);
     }
+    library.lighting.sky_rays = library.ambient_occlusion.occlusion_rays;
     let bind = interact::Bind {
         gbuffer: gbuffer.bind(),
         lighting: lighting.tiles.bind(),

@@ -18,7 +18,8 @@ use crate::gpu::{Buffer, Device, Frame, Image, IndirectGroups};
 use crate::plan::{Architecture, Plan};
 use crate::shader::lib::interact_steps::{BRANCH_WORDS, NO_TREE, STEPS, TREE_QUEUES, TREE_WORDS};
 use crate::shader::{
-    Library, interact_begin, interact_extend, interact_light, interact_next, interact_sample, interact_split, lib,
+    Library, interact_ambient, interact_begin, interact_extend, interact_light, interact_next, interact_sample,
+    interact_split, lib,
 };
 use crate::share::{StepSizes, WorkSize};
 use crate::upload::shared::pending_branches;
@@ -134,6 +135,11 @@ impl RayTrees {
                 let bind = interact_light::Bind { interact_steps: self.bind(), lighting: lighting.tiles.bind() };
                 let push = interact_light::Push { trees_at_once: self.count, this_step };
                 frame.compute_indirect(name, &bind, &interact_light::Constants { library }, &push, met)?;
+                if library.lighting.environment_apart {
+                    let bind = interact_ambient::Bind { interact_steps: self.bind() };
+                    let push = interact_ambient::Push { trees_at_once: self.count, this_step };
+                    frame.compute_indirect(name, &bind, &interact_ambient::Constants { library }, &push, met)?;
+                }
                 let bind = interact_split::Bind { interact_steps: self.bind() };
                 let push = interact_split::Push { trees_at_once: self.count, this_step };
                 frame.compute_indirect(name, &bind, &interact_split::Constants { library }, &push, met)?;

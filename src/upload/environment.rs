@@ -13,7 +13,7 @@ use ash::vk;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place, Sampled, SamplerDesc};
+use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, NOTHING, Place, Sampled, SamplerDesc};
 use crate::image::file;
 use crate::plan::Plan;
 use crate::scene::environment::Environment;
@@ -37,6 +37,8 @@ pub struct EnvironmentOnDevice {
     reflectance: Image,
     /// [`share::EnvironmentTerms`].
     pub terms: Buffer,
+    /// Directions of ambient occlusion for all samples of a pixel: [`SkyDirection`].
+    pub sky_directions: Buffer,
 }
 
 /// The user's scale, rotation and blur of the environment.
@@ -56,7 +58,8 @@ type Texel = [f32; 4];
 type Levels = Vec<(u32, u32, Vec<Texel>)>;
 
 impl EnvironmentOnDevice {
-    /// Uploads and prefilters `environment` as far as the plan needs it.
+    /// Uploads and prefilters `environment` as far as the plan needs it; `seed` is that of the directions of ambient
+    /// occlusion.
     ///
     /// # Errors
     /// When memory is short.
@@ -65,6 +68,7 @@ impl EnvironmentOnDevice {
         plan: &Plan,
         environment: Option<&Environment>,
         turn: EnvironmentRotation,
+        seed: u32,
     ) -> Result<Self> {
         let lights = plan.ambient || plan.reflection || plan.rays.is_some();
         let chain = match environment {
@@ -101,7 +105,14 @@ impl EnvironmentOnDevice {
             levels: levels.len() as f32,
             blur: turn.blur * turn.blur,
         };
-        Ok(Self { sky, prefiltered, reflectance, terms: Buffer::with_data(device, "environment terms", &[terms])? })
+        let around = environment.map(|map| Sky { map, intensity: turn.intensity, rotation: turn.rotation });
+        Ok(Self {
+            sky,
+            prefiltered,
+            reflectance,
+            terms: Buffer::with_data(device, "environment terms", &[terms])?,
+            sky_directions: sky_directions(device, plan, around, seed)?,
+        })
     }
 
     /// The environment map, for the background and for rays.
@@ -303,12 +314,11 @@ fn directional_reflectance(cos_v: f64, roughness: f64) -> [f64; 2] {
     sum.map(|s| s / f64::from(SAMPLES))
 }
 
-/// The directions of ambient occlusion for all samples of a pixel; `None` without it.
-///
-/// # Errors
-/// When memory is short.
-pub fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Option<Buffer>> {
-    let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else { return Ok(None) };
+/// The directions of ambient occlusion for all samples of a pixel.
+fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
+    let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else {
+        return Buffer::new(device, NOTHING, 0, Place::Device);
+    };
     let directions = transport::sky_directions::sky_directions(sky, plan.occlusion_rays() * plan.samples, seed);
     let directions: Vec<SkyDirection> = directions
         .iter()
@@ -318,7 +328,7 @@ pub fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, s
             solid_angle: at.solid_angle as f32,
         })
         .collect();
-    Buffer::with_data(device, "sky directions", &directions).map(Some)
+    Buffer::with_data(device, "sky directions", &directions)
 }
 
 #[cfg(test)]

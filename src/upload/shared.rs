@@ -55,6 +55,7 @@ impl<'a> OnDevice<'a> {
                 prefiltered: environment.prefiltered(),
             }
             .entries(),
+            lib::ambient_occlusion::Scene { sky_directions: &environment.sky_directions }.entries(),
             lib::reflectance::Scene { reflectance: environment.reflectance() }.entries(),
         ]
         .concat()
@@ -121,6 +122,7 @@ impl<'a> OnDevice<'a> {
             },
             ambient_occlusion: lib::ambient_occlusion::Constants {
                 occlusion_rays: with.occlusion,
+                sample_directions: with.occlusion,
                 // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
                 lobe_rays: if plan.screen.mirrors { 0 } else { with.occlusion.div_ceil(4) },
             },
@@ -153,6 +155,8 @@ impl<'a> OnDevice<'a> {
                 screen_mirrors: false,
                 sampled_apart: false,
                 lit_at_hits: false,
+                environment_apart: false,
+                sky_rays: 0,
             },
             loops: lib::loops::Constants {
                 loop_budget: match scene.device().limits_loops() {
