@@ -21,7 +21,8 @@
 #include "share/sky_direction.glsl"
 
 layout(constant) const uint OCCLUSION_RAYS = 1;    // of a surface, for each sample of a pixel
-layout(constant) const uint SAMPLE_DIRECTIONS = 1; // of the sample: as many, or more of which a surface has a part
+layout(constant) const uint SAMPLE_DIRECTIONS = 1; // in the list: those of primary surfaces, then those of others
+layout(constant) const uint FIRST_DIRECTION = 0;   // of the surface's
 layout(constant) const uint LOBE_RAYS = 1;      // in each specular lobe; 0: lobes are not occluded
 
 layout(scene, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
@@ -53,9 +54,7 @@ struct SkyRay {
 // convex mesh does not occlude itself.
 SkyRay sky_ray(Surface s, uint i) {
     SkyRay r;
-    // A quarter of them for each sample: four samples have those of four different places, all over the sphere together.
-    uint first = trace_terms.sample_index * OCCLUSION_RAYS % SAMPLE_DIRECTIONS;
-    r.sky = sky_directions[trace_terms.sample_index * SAMPLE_DIRECTIONS + first + i];
+    r.sky = sky_directions[trace_terms.sample_index * SAMPLE_DIRECTIONS + FIRST_DIRECTION + i];
     bool shines_through = DIFFUSE_TRANSMISSION && largest(s.diffuse_through) > 0.0;
     r.side = shines_through && dot(s.n_triangle, r.sky.direction) < 0.0 ? -1.0 : 1.0;
     r.cos_l = dot(s.n_triangle, r.sky.direction) * r.side > 0.0 ? max(dot(s.n, r.sky.direction) * r.side, 0.0) : 0.0;

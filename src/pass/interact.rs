@@ -12,12 +12,9 @@ use super::lighting::Lighting;
 use super::part::Part;
 use super::ray_trees::RayTrees;
 use crate::gpu::{Frame, Image};
-use crate::plan::Rays;
-use crate::shader::interact;
+use crate::plan::{FEWER_AT_HITS, Rays};
 
-/// Light samples of a primary surface, and rays of ambient occlusion, for each of a surface that a ray meets
-/// (docs/decisions/light-samples.md).
-const FEWER_AT_HITS: u32 = 4;
+use crate::shader::interact;
 
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
 /// part is added: all rays are traced once more, over the same tiles. With `trees`, in steps.
@@ -45,9 +42,9 @@ pub fn interact<'a>(
     library.lighting.lit_at_hits = true;
     library.lighting.light_budget = library.loops.loop_budget;
     library.gbuffer.stored_triangles = true;
-    // Many surfaces that rays meet share a pixel.
     library.emitters.light_samples = library.emitters.light_samples.div_ceil(FEWER_AT_HITS);
-    library.ambient_occlusion.occlusion_rays = library.ambient_occlusion.occlusion_rays.div_ceil(FEWER_AT_HITS);
+    library.ambient_occlusion.first_direction = lighting.plan.occlusion_rays();
+    library.ambient_occlusion.occlusion_rays = lighting.plan.occlusion_rays_at_hits();
     library.lighting.environment_apart = lighting.plan.occlusion_rays() > 0;
     library.ray_tree.first_event = part.map_or(0, |part| part as u32);
     if let Some(trees) = trees {

@@ -31,4 +31,4 @@ pub use knobs::{KNOBS, Knob, Knobs, Model};
 pub use planner::needs_lights;
 pub use refused::{Refused, Setting};
 pub use surfaces::{casts_in_maps, is_transparent, mirrors};
-pub use work::{Attenuation, LightSamples, March, Paths, Plan, Rays, Screen, Stored};
+pub use work::{Attenuation, FEWER_AT_HITS, LightSamples, March, Paths, Plan, Rays, Screen, Stored};

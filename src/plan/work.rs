@@ -203,11 +203,21 @@ pub struct Screen {
     pub refraction: bool,
 }
 
+/// Light samples and rays of ambient occlusion of a primary surface for each of a surface that a ray meets: many of
+/// these share a pixel (docs/decisions/light-samples.md).
+pub const FEWER_AT_HITS: u32 = 4;
+
 impl Plan {
     /// Rays of ambient occlusion over the hemisphere of each surface in the picture; 0 without it.
     #[must_use]
     pub fn occlusion_rays(&self) -> u32 {
         self.rays.map_or(0, |rays| rays.occlusion)
+    }
+
+    /// Rays of ambient occlusion of each surface that reflected and refracted rays meet.
+    #[must_use]
+    pub fn occlusion_rays_at_hits(&self) -> u32 {
+        self.occlusion_rays().div_ceil(FEWER_AT_HITS)
     }
 
     /// Ray marching through grids of σ.

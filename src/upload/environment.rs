@@ -319,9 +319,14 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
     let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else {
         return Buffer::new(device, NOTHING, 0, Place::Device);
     };
-    let directions = transport::sky_directions::sky_directions(sky, plan.occlusion_rays() * plan.samples, seed);
-    let directions: Vec<SkyDirection> = directions
-        .iter()
+    // Of each sample those of primary surfaces, then those of surfaces that rays meet: a coarser cut, whose directions
+    // are the middles of larger regions.
+    let [primary, hit] = [plan.occlusion_rays(), plan.occlusion_rays_at_hits()];
+    let of_primary = transport::sky_directions::sky_directions(sky, primary * plan.samples, seed);
+    let of_hits = transport::sky_directions::sky_directions(sky, hit * plan.samples, seed);
+    let samples = of_primary.chunks(primary as usize).zip(of_hits.chunks(hit as usize));
+    let directions: Vec<SkyDirection> = samples
+        .flat_map(|(of_primary, of_hit)| of_primary.iter().chain(of_hit))
         .map(|at| SkyDirection {
             direction: at.direction.as_vec3().to_array(),
             weight: at.weight.map(|w| w as f32),

@@ -122,7 +122,8 @@ impl<'a> OnDevice<'a> {
             },
             ambient_occlusion: lib::ambient_occlusion::Constants {
                 occlusion_rays: with.occlusion,
-                sample_directions: with.occlusion,
+                sample_directions: plan.occlusion_rays() + plan.occlusion_rays_at_hits(),
+                first_direction: 0,
                 // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
                 lobe_rays: if plan.screen.mirrors { 0 } else { with.occlusion.div_ceil(4) },
             },
