@@ -30,7 +30,11 @@ pub fn light<'a>(
         library.sigma_grid = lib::sigma_grid::Constants::default();
         library.shadow = lib::shadow::Constants { shadows: library.shadow.shadows, ..Default::default() };
     }
-    library.lighting.environment_apart = lighting.plan.occlusion_rays() > 0;
+    // The pass traces no rays of ambient occlusion: the pass of that name adds the environment's light.
+    library.ambient_occlusion = lib::ambient_occlusion::Constants::default();
+    if lighting.plan.occlusion_rays() > 0 {
+        library.environment_light = lib::environment_light::Constants::default();
+    }
     library.lighting.screen_mirrors = lighting.plan.screen.mirrors && lighting.plan.light_samples.emitting;
     let constants = light::Constants { library };
     let bind = light::Bind {
