@@ -431,7 +431,7 @@ fn a_shade_is_lit_through_its_own_walls() {
     made.front(0.3);
     let (back, through) = (0.45, 0.4);
     let want = 0.5 * (back + through * through / (1.0 - back));
-    // Without visibility it would be 0.5 (ρ + τ), 18 % more.
+    // Without visibility it would be 0.5 (ρ + τ), 15 % more.
     for (of, samples, bound) in [(Model::Recursive, 4, 1e-4), (Model::Global, 256, 0.01)] {
         let (_, film) = gpu.shot(&made.0, Some(&sky), model(of, [16, 16], &[&format!("samples={samples}")]));
         let mean = film.rgba.iter().map(|pixel| f64::from(pixel[0])).sum::<f64>() / film.rgba.len() as f64;

@@ -23,7 +23,7 @@
 layout(constant) const uint OCCLUSION_RAYS = 1;    // of a surface, for each sample of a pixel
 layout(constant) const uint SAMPLE_DIRECTIONS = 1; // in the list: those of primary surfaces, then those of others
 layout(constant) const uint FIRST_DIRECTION = 0;   // of the surface's
-layout(constant) const uint LOBE_RAYS = 1;      // in each specular lobe; 0: lobes are not occluded
+layout(constant) const uint LOBE_RAYS = 1;         // in each specular lobe; 0: lobes are not occluded
 
 layout(scene, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
 

@@ -13,7 +13,6 @@ use super::part::Part;
 use super::ray_trees::RayTrees;
 use crate::gpu::{Frame, Image};
 use crate::plan::{FEWER_AT_HITS, Rays};
-
 use crate::shader::interact;
 
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the

@@ -47,8 +47,8 @@ impl Piece {
     }
 }
 
-/// Rows of the grid that is cut; there are twice as many columns. 1.4° is finer than the penumbra of anything that the
-/// directions show: with twice as coarse a grid 64 directions are off by 3 % more.
+/// Rows of the grid that is cut; there are twice as many columns. With twice as coarse a grid
+/// 64 directions are off by 3 % more.
 const ROWS: u32 = 128;
 
 /// The cells of a grid of longitudes and latitudes.
