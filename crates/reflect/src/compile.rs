@@ -13,6 +13,7 @@ use super::cache::{Cache, Key};
 use super::compact::compacted;
 use super::files::Result;
 use super::interface::{Interface, PassSlots};
+use super::optimise::Optimiser;
 use super::reflect::Stage;
 
 /// Maps each named item of `work` in parallel, with one thread per core; each thread has its own `tool`.
@@ -57,6 +58,7 @@ pub(crate) struct Recipe {
     without: Vec<String>,
     /// Optimised code of earlier builds.
     pub(crate) cache: Cache,
+    optimiser: Optimiser,
     /// Code of a small shader, by which another version of the compiler is known.
     sample: String,
 }
@@ -88,7 +90,8 @@ impl Recipe {
     pub(crate) fn new(root: &Path, without: Vec<String>, cache: Cache) -> Result<Self> {
         let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
         let interface = Interface::read(root)?;
-        let mut new = Self { compiler, root: root.to_owned(), interface, without, cache, sample: String::new() };
+        let (root, sample, optimiser) = (root.to_owned(), String::new(), Optimiser::installed());
+        let mut new = Self { compiler, root, interface, without, cache, optimiser, sample };
         let level = shaderc::OptimizationLevel::Performance;
         let sample = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}")).and_then(|mut options| {
             options.set_optimization_level(level);
@@ -137,17 +140,21 @@ impl Recipe {
     fn compile(&self, kinds: &[shaderc::ShaderKind], texts: &[(String, String)]) -> Result<Program> {
         let slots = self.interface.pass_slots(texts)?;
         let stage = |(&kind, (name, text)): (&shaderc::ShaderKind, &(String, String))| -> Result<Stage> {
-            let level = shaderc::OptimizationLevel::Performance;
             let read = RefCell::new(Key::new());
             let module = self.plain(kind, name, text, &slots, &read)?;
             let version = shaderc::SpirvVersion::V1_6;
             // What the compiler has just read, and all else that decides the code.
             let mut key = read.into_inner();
-            let settings = format!("{kind:?} {level:?} {version:?} {:?} {}", self.without, self.sample);
+            let settings = format!("{kind:?} {version:?} {:?} {} {:?}", self.without, self.sample, self.optimiser);
             key.add(&settings);
-            [include_str!("compile.rs"), include_str!("compact.rs")].iter().for_each(|code| key.add(code));
+            let code = [include_str!("compile.rs"), include_str!("compact.rs"), include_str!("optimise.rs")];
+            code.iter().for_each(|code| key.add(code));
             let unread = RefCell::new(Key::new());
-            let make = || self.words(kind, name, text, &slots, level, version, &self.without, &unread);
+            let level = self.optimiser.level_of_compiler();
+            let make = || {
+                let words = self.words(kind, name, text, &slots, level, version, &self.without, &unread)?;
+                compacted(self.optimiser.optimised(name, words)?)
+            };
             let words = self.cache.words(&key, make)?;
             Ok(Stage { kind, module, words, path: name.clone() })
         };
@@ -186,6 +193,6 @@ impl Recipe {
             shaderc::Error::CompilationError(_, log) => log,
             other => format!("{name}: {other}"),
         })?;
-        compacted(artifact.as_binary().to_vec())
+        Ok(artifact.as_binary().to_vec())
     }
 }

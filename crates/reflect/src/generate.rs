@@ -4,13 +4,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
+use std::path::Path;
 
 use super::compile::{Program, Recipe, on_all_cores};
 use super::contract;
 use super::equations;
 use super::files::{Result, files};
 use super::interface::{File, Interface, SETS, Shared};
-use super::reflect::{Binding, Declared, Names, Struct, all_constants, declared, local_size, stage_flag, structs};
+use super::reflect::{
+    Binding, Declared, Names, Stage, Struct, all_constants, declared, local_size, stage_flag, structs,
+};
 use rspirv::spirv::Op;
 
 /// A program with its declarations.
@@ -382,6 +385,22 @@ fn shared_sets(interface: &Interface, all: &Declared) -> Result<Vec<&'static str
     Ok(sets)
 }
 
+/// Name of the file with a stage's SPIR-V, beside the generated code.
+fn spirv_file(program: &str, stage: &Stage) -> String {
+    format!("{}.{}.spv", program.replace('/', "."), stage_flag(stage.kind).to_lowercase())
+}
+
+/// Writes the SPIR-V of a program's stages, in the host's byte order. The code includes it as bytes: numbers in its text, 16 MB
+/// in all, took every check and build 3 s more.
+pub(crate) fn write_spirv(folder: &Path, name: &str, program: &Program) -> Result<()> {
+    for stage in &program.stages {
+        let path = folder.join(spirv_file(name, stage));
+        let bytes: Vec<u8> = stage.words.iter().flat_map(|word| word.to_ne_bytes()).collect();
+        fs::write(&path, bytes).map_err(|e| format!("writing {}: {e}", path.display()))?;
+    }
+    Ok(())
+}
+
 /// A `Program` as a Rust expression.
 pub(crate) fn literal(interface: &Interface, name: &str, program: &Program, all: &Declared) -> Result<String> {
     let of_set = |set: u32| all.bindings.values().filter(move |b| b.set == set);
@@ -405,10 +424,11 @@ pub(crate) fn literal(interface: &Interface, name: &str, program: &Program, all:
     }
     let mut stage_table = String::new();
     for stage in &program.stages {
-        let words = stage.words.iter().map(|w| format!("{w:#x}")).collect::<Vec<_>>().join(",");
         stage_table += &format!(
-            "            Stage {{ flag: vk::ShaderStageFlags::{}, words: &[{words}] }},\n",
-            stage_flag(stage.kind)
+            "            Stage {{ flag: vk::ShaderStageFlags::{}, words: &bytemuck::must_cast::<_, [u32; {}]>(*include_bytes!({:?})) }},\n",
+            stage_flag(stage.kind),
+            stage.words.len(),
+            spirv_file(name, stage),
         );
     }
     let [x, y, z] = local_size(&program.stages[0].module);
@@ -437,7 +457,12 @@ pub(crate) fn literal(interface: &Interface, name: &str, program: &Program, all:
 ///  Each function states how pictures use it: a pass calls it, or it has `@host`, or `@lab` with a function that a pass
 ///  calls.
 /// When all shaders are built (`whole`), a function that neither a pass nor a probe reaches is an error.
-pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whole: bool) -> Result<String> {
+pub(crate) fn probes(
+    recipe: &Recipe,
+    programs: &BTreeMap<String, Program>,
+    whole: bool,
+    folder: &Path,
+) -> Result<String> {
     let library = equations::library(&recipe.root.join("lib"))?;
     let work = library.equations.iter().map(|equation| (equation.name.clone(), equation));
     let compiled = on_all_cores(
@@ -446,6 +471,7 @@ pub(crate) fn probes(recipe: &Recipe, programs: &BTreeMap<String, Program>, whol
         |recipe, equation| {
             let name = format!("probe/{}", equation.name);
             let program = recipe.source(shaderc::ShaderKind::Compute, name.clone(), &equation.probe)?;
+            write_spirv(folder, &name, &program)?;
             let stage = &program.stages[0];
             let facts = contract::check(&name, &stage.module, &stage.words, &library.functions)?;
             let literal = literal(&recipe.interface, &name, &program, &declared(&program.stages)?)?;

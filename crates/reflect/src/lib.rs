@@ -22,6 +22,7 @@ mod files;
 mod generate;
 mod inlined;
 mod interface;
+mod optimise;
 mod reflect;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,8 +34,8 @@ use compile::Recipe;
 use files::{Result, files, stem};
 pub use inlined::{Share, by_function};
 
-/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs` and `share.rs` into `out_dir`. Code
-/// guarded by the specialization constants `without` is removed.
+/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs`, `share.rs` and the SPIR-V of each stage into
+/// `out_dir`. Code guarded by the specialization constants `without` is removed.
 ///
 /// # Errors
 /// Compiler messages as `file:line: message`, or the fault of a declaration.
@@ -56,7 +57,8 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
         },
     )?;
     let mut code = generate::Programs::of(&recipe.interface, &programs)?.rust()?;
-    code += &generate::probes(&recipe, &programs, without.is_empty())?;
+    programs.iter().try_for_each(|(name, program)| generate::write_spirv(out_dir, name, program))?;
+    code += &generate::probes(&recipe, &programs, without.is_empty(), out_dir)?;
     cache.trim();
     let write =
         |name: &str, text: String| fs::write(out_dir.join(name), text).map_err(|e| format!("writing {name}: {e}"));
