@@ -59,7 +59,9 @@ fn a_run_is_what_its_commands_draw() {
     // They are presets or found by the search; none of them has more error than a quicker one.
     let of = |r: &Value| &points[r["point"].as_u64().expect("a place") as usize];
     assert!(recommended.iter().map(of).all(|p| p["name"] == "reference" || p["family"] != "local"), "{recommended:?}");
-    assert!(recommended.windows(2).all(|pair| error(of(&pair[0])) >= error(of(&pair[1]))), "{recommended:?}");
+    // The reference's own figure is what its noise hides: after 16 samples more than the errors of settings before it.
+    let errors: Vec<f64> = recommended.iter().map(of).filter(|p| p["name"] != "reference").map(error).collect();
+    assert!(errors.is_sorted_by(|quicker, slower| quicker >= slower), "{errors:?}");
 
     // The error is that of the pictures as they are shown, less the reference's noise.
     for name in ["local", "recursive"] {
