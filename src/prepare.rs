@@ -18,6 +18,7 @@ use crate::scene::{AmbientLight, Bounds, Light, LightKind, Prune, Scene};
 use crate::transport::bvh::Bvh;
 use crate::transport::contact::{has_coincident_interfaces, twins};
 use crate::transport::emitters::{Emitters, Sky};
+use crate::transport::occluders::mean_albedo;
 
 /// Conditions under which a scene is prepared.
 #[derive(Debug, Clone, Copy)]
@@ -127,6 +128,8 @@ pub struct Hierarchy {
     pub offset: f64,
     /// Whether some closed dielectric mesh touches another surface (coincident interfaces).
     pub touching: bool,
+    /// Albedo of what surfaces face ([`mean_albedo`]); black without rays of ambient occlusion.
+    pub occluders: [f64; 3],
     /// Warnings about the triangles, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -244,7 +247,11 @@ impl Hierarchy {
         let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
         let offset = ray_offset(extent.into());
         let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.body, offset);
-        Self { build_ms, offset, touching, warnings: odd_triangles(scene, &bvh, solids), bvh }
+        let occluders = match rays.occlusion {
+            0 => [0.0; 3],
+            _ => mean_albedo(scene, solids, &bvh, offset),
+        };
+        Self { build_ms, offset, touching, occluders, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }
 

@@ -9,7 +9,9 @@ use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::{Environment, direction, irradiance};
 use etalon::scene::{Material, Scene};
 use etalon::study::shape::Shape;
+use etalon::transport::bvh::Bvh;
 use etalon::transport::emitters::Sky;
+use etalon::transport::occluders::mean_albedo;
 use etalon::transport::sky_directions::sky_directions;
 use etalon_testing::gpu::{Gpu, knobs, settings, spread};
 use etalon_testing::made::{Made, orthographic, perspective};
@@ -53,6 +55,10 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
     let options = Options { blend: true, textures: false };
     let world = World::new(&scene, options);
     let harmonics = map.irradiance_sh9();
+    let solids = etalon::scene::solid::solids(&scene);
+    let faced = mean_albedo(&scene, &solids, &Bvh::build(&scene).expect("a tree"), 1e-6);
+    // As many rays reach the panels' fronts from the floor as reach it from them; those that reach their backs come on top.
+    assert!((faced[0] - 1.1 / 3.0).abs() < 0.05 && (faced[1] - 1.7 / 3.0).abs() < 0.05, "{faced:?}");
     let seen = picture(&scene, &scene.cameras[0], size[0], size[1], options);
     let (mut compared, mut off, mut darker) = (0, 0, 0);
     for (i, pixel) in seen.iter().enumerate() {
@@ -81,8 +87,9 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
         for channel in 0..3 {
             let share = sum[channel] / all[channel];
             let (obscured, brightness) = (shut / hemisphere, there[channel] / here[channel]);
-            let q = albedo[channel] * obscured;
-            let expected = (share + q * (1.0 - obscured) * brightness) / (1.0 - q * q);
+            let of_others = 0.5 * (albedo[channel] + faced[channel]);
+            let (received, given) = (of_others * obscured, albedo[channel] * obscured);
+            let expected = (share + received * (1.0 - obscured) * brightness) / (1.0 - received * given);
             let got = f64::from(occluded.rgba[i][channel]) / f64::from(plain.rgba[i][channel]);
             let error = (got - expected).abs();
             worst = worst.max(if error.is_nan() { f64::INFINITY } else { error });
@@ -113,6 +120,29 @@ fn an_open_surface_has_plain_ambient_light() {
                 assert!((a[channel] / b[channel] - 1.0).abs() < 1e-5, "{rung}: {a:?}, not {b:?}");
             }
         }
+    }
+}
+
+/// What clear glass reflects away from a surface it reflects towards it from the other side, where the light is uniform.
+#[test]
+fn clear_glass_hides_nothing_in_uniform_light() {
+    let (gpu, map) = (Gpu::open(), Environment::constant([1.0; 3]));
+    let mut made = Made::new("glass");
+    made.add(Shape::plane(6.0, 6.0, 1), matt([0.6, 0.6, 0.6]), DAffine3::IDENTITY);
+    let pane = Material { transmission: 1.0, roughness: 0.0, metallic: 0.0, double_sided: true, ..Material::default() };
+    made.add(Shape::panel(2.0, 2.0), pane.clone(), turned(DVec3::Y, -90.0, DVec3::new(1.2, 1.0, 0.0)));
+    let ball = Material { thickness: 1.0, double_sided: false, ..pane };
+    made.add(Shape::sphere(0.5, 32), ball, DAffine3::from_translation(DVec3::new(0.0, 0.6, 0.0)));
+    made.camera(DVec3::new(0.8, 5.0, 0.0), DVec3::new(0.8, 0.0, 0.0), orthographic(0.3));
+    let size = [16, 16];
+    let shot = |rung: &str| {
+        let choices = ["reflection=off", "refraction=ray", "shadows=off", "samples=4", rung];
+        gpu.shot(&made.0, Some(&map), Settings { knobs: knobs(&choices), ..settings(size) }).1
+    };
+    let (plain, beside) = (shot("indirect=ambient"), shot("indirect=occlusion:16"));
+    for (a, b) in plain.rgba.iter().zip(&beside.rgba) {
+        // With what the glass reflects counted as hidden up to 8 % would be missing.
+        assert!((a[0] / b[0] - 1.0).abs() < 1e-5 && b[0] > 0.5, "{b:?}, not {a:?}");
     }
 }
 

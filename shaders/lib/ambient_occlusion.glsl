@@ -5,8 +5,10 @@
 //    whatever the directions are, and neighbouring pixels have no noise between them.
 // 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
 //    radiance (split sum).
-// 3. Interreflection. What occludes the share O of the directions is taken to face this surface, to have the same albedo ρ,
-//    and to have the same share occluded by this surface, as inside a concavity: E = V E₀ + ρ O E', E' = (1 − O) E₀' + ρ O E.
+// 3. Interreflection. What occludes the share O of the directions is taken to face this surface, and to have the same share
+//    occluded by this surface, as inside a concavity. Half of it is taken to have this surface's albedo ρ, as parts of one
+//    object, and half the mean of what the scene's surfaces face (src/transport/occluders.rs). With ρ' the mean of both,
+//    E = V E₀ + ρ' O E' and E' = (1 − O) E₀' + ρ O E.
 // 4. Light from behind, which a surface transmits diffusely. What occludes its back is taken to be of the same material, as
 //    the other walls of a lampshade: it lets E₀ through, by its albedo τ of diffuse transmission, and gives back what
 //    arrives there. E = V E₀ + (1 − V)(τ E₀ + ρ E).
@@ -91,7 +93,7 @@ SkyShown shown_to(Surface s) {
     for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         SkyRay r = sky_ray(s, i);
         vec3 n = s.n_triangle * r.side;
-        show(shown, r, visibility(s.p_bvh, n, free_side(s, r), s.face, s.media, r.sky.direction, LARGEST, r.cos_l > 0.0));
+        show(shown, r, visibility(s.p_bvh, n, free_side(s, r), s.face, s.media, r.sky.direction, LARGEST, true, r.cos_l > 0.0));
     }
     return shown;
 }
@@ -106,19 +108,19 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
         vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
         vec3 r = reflect_ray(-s.v, h).R;
         float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
-        seen += weight * visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, weight > 0.0);
+        seen += weight * visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0);
         all += weight;
     }
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
 // Irradiance of a surface and of what occludes it, in this order or the other: of each the irradiance that arrives, `here`
-// and `there`, and the share `given_back` of the other's. E = E₁ + q E' and E' = E₂ + q E, so E = (E₁ + q E₂)/(1 − q²). Here
-// and below every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two
-// ways, by what else stands in the program.
-vec3 exchanged_irradiance(vec3 here, vec3 there, vec3 given_back) {
-    precise vec3 kept = 1.0 - given_back * given_back;
-    precise vec3 both = here + there * given_back;
+// and `there`, and the share of the other's, q `received` and q' `given`. E = E₁ + q E' and E' = E₂ + q' E, so
+// E = (E₁ + q E₂)/(1 − q q'). Here and below every step is precise: a driver's compiler turns x (1 − a) + y a into an
+// interpolation of its own, in one of two ways, by what else stands in the program.
+vec3 exchanged_irradiance(vec3 here, vec3 there, vec3 received, vec3 given) {
+    precise vec3 kept = 1.0 - received * given;
+    precise vec3 both = here + there * received;
     return both / kept;
 }
 
@@ -147,7 +149,10 @@ OccludedLight occluded_light(Surface s, EnvironmentFactors factors, SkyShown sho
     // What occludes faces this surface, and is taken to be as open.
     float size2 = dot(shown.occluded_direction, shown.occluded_direction);
     precise vec3 there = environment_irradiance(size2 > 0.0 ? -shown.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - occluded_share);
-    precise vec3 given_back = kept * occluded_share;
+    // In a band of wavelengths the mean, of red, green and blue, is of no use.
+    precise vec3 of_others = SPECTRAL ? kept : min(0.5 * (kept + trace_terms.occluder_albedo), 0.98);
+    precise vec3 given = kept * occluded_share;
+    precise vec3 received = of_others * occluded_share;
     if (DIFFUSE_TRANSMISSION) {
         vec3 open = share_of(shown.seen_behind, shown.all_behind);
         precise vec3 shut = 1.0 - open;
@@ -155,8 +160,8 @@ OccludedLight occluded_light(Surface s, EnvironmentFactors factors, SkyShown sho
         factors.through *= arriving / (1.0 - shut * min(s.diffuse, 0.98));
     }
     OccludedLight r;
-    r.diffuse = diffuse_environment_light(factors, exchanged_irradiance(here, there, given_back));
-    r.beside = kept * exchanged_irradiance(there, here, given_back) * INV_PI;
+    r.diffuse = diffuse_environment_light(factors, exchanged_irradiance(here, there, received, given));
+    r.beside = of_others * exchanged_irradiance(there, here, given, received) * INV_PI;
     return r;
 }
 
@@ -187,12 +192,23 @@ vec3 occluded_environment_light(Surface s) {
     return result;
 }
 
-// At a surface that a ray meets: the lobes see the whole environment.
-vec3 environment_light_at_hit(Surface s, SkyShown shown) {
+// What the layers of a surface that a ray meets make of the environment, known before its own rays are traced: the lobes see
+// the whole environment.
+struct LayersAtHit {
+    EnvironmentFactors factors;
+    vec3 mirrored; // radiance to the eye of the lobes
+};
+
+LayersAtHit layers_at_hit(Surface s) {
     EnvironmentFactors factors = environment_factors(s, layer_albedo(s, albedo_of_base(s)));
-    precise vec3 result = occluded_light(s, factors, shown).diffuse;
-    if (REFLECTION && !s.base_traced) result += factors.base_lobe * radiance_in_base_lobe(s);
-    if (CLEARCOAT && REFLECTION && !s.coat_traced) result += factors.coat_lobe * radiance_in_coat_lobe(s);
+    precise vec3 mirrored = vec3(0.0);
+    if (REFLECTION && !s.base_traced) mirrored = factors.base_lobe * radiance_in_base_lobe(s);
+    if (CLEARCOAT && REFLECTION && !s.coat_traced) mirrored += factors.coat_lobe * radiance_in_coat_lobe(s);
+    return LayersAtHit(factors, mirrored);
+}
+
+vec3 environment_light_at_hit(Surface s, LayersAtHit layers, SkyShown shown) {
+    precise vec3 result = occluded_light(s, layers.factors, shown).diffuse + layers.mirrored;
     return s.unlit ? vec3(0.0) : result;
 }
 #endif

@@ -124,7 +124,7 @@ vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, ui
         // From p_bvh, the point on the triangle: p_rel may come from depth (lib/primary.glsl).
         vec3 to_light = light.to_light;
         if (!LIT_AT_HITS && !light.directional && !is_sample) to_light += p_rel - (s.p_bvh - trace_terms.bvh_from_rel);
-        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, to_light, light.directional ? LARGEST : 1.0, wanted);
+        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, to_light, light.directional ? LARGEST : 1.0, SKY_RAYS > 0 && is_sky, wanted);
         if (SKY_RAYS > 0) {
             if (is_sky) show(sky_shown, sky, visible);
         }

@@ -56,8 +56,10 @@ vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
     return tint;
 }
 
-// Transmittance of one surface for light along `direction`; updates the list of media.
-vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
+// Transmittance of one surface for light along `direction`; updates the list of media. Where the light is that of the whole
+// environment, `ambient`, what the interfaces reflect counts as passing: as much of it arrives from the other side, so that
+// in uniform light a body without colour and absorption hides nothing.
+vec3 filtered(HitPoint point, vec3 direction, bool ambient, inout uvec4 media) {
     HitSurface hit = hit_surface(point, direction, 0.0, FILTERING_SLOTS);
     float cos_v = abs(dot(point.n_smooth, direction));
     uvec4 after = media;
@@ -75,8 +77,8 @@ vec3 filtered(HitPoint point, vec3 direction, inout uvec4 media) {
     media = after;
     vec3 tint = tint_through(hit.s.base, point.sheet, hit.front, hit.sigma_thickness * hit.thickness);
     float transmits = hit.transmits * (1.0 - hit.s.metallic);
-    vec3 reflected = straight_reflectance(hit.s, cos_v, n1, n2);
-    float under = CLEARCOAT ? 1.0 - fresnel_of_coat(hit.s, cos_v) : 1.0;
+    vec3 reflected = ambient ? vec3(0.0) : straight_reflectance(hit.s, cos_v, n1, n2);
+    float under = CLEARCOAT && !ambient ? 1.0 - fresnel_of_coat(hit.s, cos_v) : 1.0;
     vec3 passes = straight_transmittance(tint, transmits, reflected, under, left_to_base(hit.s));
     return blend(vec3(1.0), passes, hit.coverage);
 }
@@ -161,8 +163,8 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
 
 // Visibility by a shadow ray. p is in bvh space, n the normal of its triangle, source_face its coplanar group, v points to
 // the viewer, `media` are those on the light's side. The light is at p + to_light, or in that direction where t_max is
-// larger than 1.
-vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_light, float t_max, bool wanted) {
+// larger than 1; `ambient` as in `filtered`.
+vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_light, float t_max, bool ambient, bool wanted) {
     vec3 origin = ray_origin(p, n, v);
     float length_of_direction = vector_length(to_light);
     // Four roundings before the light, so that a surface touching it does not occlude it.
@@ -193,7 +195,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_l
                 if (ABSORPTION == ABSORPTION_PATH && medium != 0) {
                     through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (hit.t - last.t) * length_of_direction);
                 }
-                through *= filtered(hit_point_of(hit, origin, to_light), to_light / length_of_direction, media);
+                through *= filtered(hit_point_of(hit, origin, to_light), to_light / length_of_direction, ambient, media);
                 last = hit;
             }
             filters = Filters(vec4(filters.t.yzw, LARGEST), uvec4(filters.triangles.yzw, NO_TRIANGLE));

@@ -125,7 +125,7 @@ void main() {
                 split(hit, boundary, ray, cone, uvec2(pixel), surface);
                 if (lit) sum += weight * radiance_to_eye(s, pixel, surface, 0, all_lights(), true);
                 if (ENVIRONMENT_APART) {
-                    precise vec3 around_here = weight * environment_light_at_hit(s, sky_shown);
+                    precise vec3 around_here = weight * environment_light_at_hit(s, layers_at_hit(s), sky_shown);
                     precise vec3 with_it = sum + around_here;
                     if (lit) sum = with_it;
                 }

@@ -19,7 +19,8 @@ void main() {
         Boundary boundary = boundary_at(hit, ray.media, ray.direction);
         if (!boundary.suppressed_by_priority) {
             Surface s = surface_for_lights(hit, boundary, found.triangle);
-            vec3 light = environment_light_at_hit(s, shown_to(s));
+            LayersAtHit layers = layers_at_hit(s);
+            vec3 light = environment_light_at_hit(s, layers, shown_to(s));
             // Read again, so that no register holds it while rays are traced.
             waiting = found_anew(waiting, shadow_rays);
             ray = last_branch();

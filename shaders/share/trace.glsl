@@ -17,5 +17,6 @@ struct TraceTerms {
     uint sample_index;
     uint interfaces;      // greatest number of surfaces that a path may meet
     uint first_emitter;   // texel of the first emitter, behind the triangles of the BVH (lib/emitters.glsl)
+    vec3 occluder_albedo; // of what surfaces of the scene face, on average (lib/ambient_occlusion.glsl)
 };
 #endif

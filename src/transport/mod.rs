@@ -12,6 +12,7 @@ pub mod events;
 pub mod layers;
 pub mod light_hierarchy;
 mod line;
+pub mod occluders;
 mod octahedral;
 pub mod photon_guiding;
 pub mod photon_map;
