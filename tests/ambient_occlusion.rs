@@ -57,7 +57,7 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
     let harmonics = map.irradiance_sh9();
     let solids = etalon::scene::solid::solids(&scene);
     let faced = mean_albedo(&scene, &solids, &Bvh::build(&scene).expect("a tree"), 1e-6);
-    // As many rays reach the panels' fronts from the floor as reach it from them; those that reach their backs come on top.
+    // As many rays reach the panels' fronts from the floor as reach it from them; those to their backs come on top.
     assert!((faced[0] - 1.1 / 3.0).abs() < 0.05 && (faced[1] - 1.7 / 3.0).abs() < 0.05, "{faced:?}");
     let seen = picture(&scene, &scene.cameras[0], size[0], size[1], options);
     let (mut compared, mut off, mut darker) = (0, 0, 0);
@@ -123,15 +123,16 @@ fn an_open_surface_has_plain_ambient_light() {
     }
 }
 
-/// What clear glass reflects away from a surface it reflects towards it from the other side, where the light is uniform.
+/// In uniform light clear glass reflects as much towards a surface as away from it.
 #[test]
 fn clear_glass_hides_nothing_in_uniform_light() {
     let (gpu, map) = (Gpu::open(), Environment::constant([1.0; 3]));
     let mut made = Made::new("glass");
     made.add(Shape::plane(6.0, 6.0, 1), matt([0.6, 0.6, 0.6]), DAffine3::IDENTITY);
-    let pane = Material { transmission: 1.0, roughness: 0.0, metallic: 0.0, double_sided: true, ..Material::default() };
-    made.add(Shape::panel(2.0, 2.0), pane.clone(), turned(DVec3::Y, -90.0, DVec3::new(1.2, 1.0, 0.0)));
-    let ball = Material { thickness: 1.0, double_sided: false, ..pane };
+    let glass = Material { transmission: 1.0, roughness: 0.0, metallic: 0.0, ..Material::default() };
+    let pane = Material { double_sided: true, ..glass.clone() };
+    made.add(Shape::panel(2.0, 2.0), pane, turned(DVec3::Y, -90.0, DVec3::new(1.2, 1.0, 0.0)));
+    let ball = Material { thickness: 1.0, ..glass };
     made.add(Shape::sphere(0.5, 32), ball, DAffine3::from_translation(DVec3::new(0.0, 0.6, 0.0)));
     made.camera(DVec3::new(0.8, 5.0, 0.0), DVec3::new(0.8, 0.0, 0.0), orthographic(0.3));
     let size = [16, 16];

@@ -1,7 +1,8 @@
-//! The mean albedo of what the surfaces of a scene face, which ambient occlusion takes for that of half of what occludes.
+//! The mean albedo of what the surfaces of a scene face, which ambient occlusion takes for that of half of what
+//! occludes.
 //!
-//! Read docs/decisions/ambient-occlusion.md. The mean is over all surfaces by their areas and over directions by the cosine,
-//! as light arrives from diffuse surfaces; it is the same for every device, traversal and camera.
+//! Read docs/decisions/ambient-occlusion.md. The mean is over all surfaces by their areas and over directions by the
+//! cosine, as light arrives from diffuse surfaces; it is the same for every device, traversal and camera.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -16,8 +17,8 @@ use crate::scene::{AlphaMode, Material, Scene};
 /// Number of rays. The mean of as many albedos has a standard error of at most 0.5 / √2048 = 0.011.
 const RAYS: usize = 2048;
 
-/// Casts rays from points all over the scene; `offset` is where they start, in metres from the surface. Black where no surface
-/// faces another one.
+/// Casts rays from points all over the scene; `offset` is where they start, in metres from the surface. Black where no
+/// surface faces another one.
 #[must_use]
 pub fn mean_albedo(scene: &Scene, solids: &Solids, bvh: &Bvh, offset: f64) -> [f64; 3] {
     let mut area = 0.0;
@@ -86,8 +87,8 @@ fn passing(m: &Material) -> f64 {
     f64::from(m.transmission * (1.0 - m.metallic))
 }
 
-/// The share of light that a material gives back: metals their base colour, other materials theirs without what they transmit
-/// diffusely. The few percent of a dielectric's own mirror are left out.
+/// The share of light that a material gives back: metals their base colour, other materials theirs without what they
+/// transmit diffusely. The few percent of a dielectric's own mirror are left out.
 fn albedo(m: &Material) -> DVec3 {
     let [r, g, b, _] = m.base_color.map(f64::from);
     let through = f64::from(m.lobes[DIFFUSE_TRANSMISSION].factors[0] * (1.0 - m.metallic));

@@ -390,8 +390,8 @@ fn spirv_file(program: &str, stage: &Stage) -> String {
     format!("{}.{}.spv", program.replace('/', "."), stage_flag(stage.kind).to_lowercase())
 }
 
-/// Writes the SPIR-V of a program's stages, in the host's byte order. The code includes it as bytes: numbers in its text, 16 MB
-/// in all, took every check and build 3 s more.
+/// Writes the SPIR-V of a program's stages, in the host's byte order. The code includes it as bytes: numbers in its
+/// text, 16 MB in all, took every check and build 3 s more.
 pub(crate) fn write_spirv(folder: &Path, name: &str, program: &Program) -> Result<()> {
     for stage in &program.stages {
         let path = folder.join(spirv_file(name, stage));

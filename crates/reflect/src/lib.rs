@@ -34,8 +34,8 @@ use compile::Recipe;
 use files::{Result, files, stem};
 pub use inlined::{Share, by_function};
 
-/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs`, `share.rs` and the SPIR-V of each stage into
-/// `out_dir`. Code guarded by the specialization constants `without` is removed.
+/// Compiles and reflects the shaders under `shaders`, and writes `shaders.rs`, `share.rs` and the SPIR-V of each stage
+/// into `out_dir`. Code guarded by the specialization constants `without` is removed.
 ///
 /// # Errors
 /// Compiler messages as `file:line: message`, or the fault of a declaration.

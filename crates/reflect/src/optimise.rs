@@ -1,5 +1,6 @@
-//! SPIRV-Tools' optimiser. Where the program `spirv-opt` is installed, each function is optimised before it is inlined, which takes
-//! half the time: all copies of a function gain from one. shaderc's own optimiser has no choice of passes, and is used elsewhere.
+//! SPIRV-Tools' optimiser. Where the program `spirv-opt` is installed, each function is optimised before it is inlined,
+//! which takes half the time: all copies of a function gain from one. shaderc's own optimiser has no choice of passes,
+//! and is used elsewhere.
 //!
 //! docs/decisions/shaderc.md, "Functions first", has the figures.
 
@@ -8,8 +9,8 @@ use std::process::{Command, Stdio};
 
 use super::files::Result;
 
-/// Passes before those of `-O`, which begins with inlining. They bring each function into the form of static single assignment;
-/// after inlining that is most of an optimiser's time.
+/// Passes before those of `-O`, which begins with inlining. They bring each function into the form of static single
+/// assignment; after inlining that is most of an optimiser's time.
 const OF_FUNCTIONS: [&str; 14] = [
     "--wrap-opkill",
     "--eliminate-dead-branches",
