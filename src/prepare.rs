@@ -129,7 +129,7 @@ pub struct Hierarchy {
     /// Whether some closed dielectric mesh touches another surface (coincident interfaces).
     pub touching: bool,
     /// Albedo of what surfaces face ([`mean_albedo`]); black without rays of ambient occlusion.
-    pub occluders: [f64; 3],
+    pub occluder_albedo: [f64; 3],
     /// Warnings about the triangles, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -247,11 +247,11 @@ impl Hierarchy {
         let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
         let offset = ray_offset(extent.into());
         let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.body, offset);
-        let occluders = match rays.occlusion {
+        let occluder_albedo = match rays.occlusion {
             0 => [0.0; 3],
             _ => mean_albedo(scene, solids, &bvh, offset),
         };
-        Self { build_ms, offset, touching, occluders, warnings: odd_triangles(scene, &bvh, solids), bvh }
+        Self { build_ms, offset, touching, occluder_albedo, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }
 

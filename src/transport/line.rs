@@ -49,13 +49,12 @@ impl Crossing<'_> {
         let instance = self.triangle.instance as usize;
         let [a, b, c] = self.triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
         let n = (b - a).cross(c - a).normalize();
-        let mirrored = scene.instances[instance].world_from_object.matrix3.determinant() < 0.0;
         let faces = n.dot(direction) < 0.0;
         let flat = if faces { n } else { -n };
         let smooth = self.normal(scene);
         let bent = if smooth.dot(flat) < 0.0 { -bend(smooth) } else { bend(smooth) };
         let normal = if -direction.dot(bent) > 0.0 { bent } else { flat };
-        Facing { front: (faces != mirrored) != solids.flipped[instance], normal, flat }
+        Facing { front: faces == winds_outwards(scene, solids, instance), normal, flat }
     }
 
     /// Unit shading normal, interpolated from the corners; NaN where they cancel.
@@ -71,6 +70,12 @@ impl Crossing<'_> {
             .sum();
         (placed.world_from_object.matrix3.inverse().transpose() * n).normalize()
     }
+}
+
+/// Whether the normals (b − a) × (c − a) of an instance's triangles are on their fronts.
+pub(super) fn winds_outwards(scene: &Scene, solids: &Solids, instance: usize) -> bool {
+    let mirrored = scene.instances[instance].world_from_object.matrix3.determinant() < 0.0;
+    mirrored == solids.flipped[instance]
 }
 
 /// Calls `crossed` with each intersection of a line from `origin` (bvh space) with t > `from`, in no order. The return

@@ -142,7 +142,7 @@ impl RaysOnDevice {
         let Some((rays, hierarchy)) = plan.rays.zip(prepared.hierarchy.as_ref()) else {
             return Self::none(device, scene);
         };
-        let &Hierarchy { ref bvh, build_ms, offset, touching, occluders, .. } = hierarchy;
+        let &Hierarchy { ref bvh, build_ms, offset, touching, occluder_albedo, .. } = hierarchy;
         let start = std::time::Instant::now();
         // The traversal: with a short stack on GPUs, where its trail is long enough; 16-bit boxes where these are
         // precise enough.
@@ -233,7 +233,7 @@ impl RaysOnDevice {
             grid_unit: grid.unit,
             nodes: sentinel as u32,
             interfaces: rays.interfaces,
-            occluder_albedo: occluders.map(|albedo| albedo as f32),
+            occluder_albedo: occluder_albedo.map(|albedo| albedo as f32),
             first_emitter: emitters_on_device.first,
             ..bytemuck::Zeroable::zeroed()
         };

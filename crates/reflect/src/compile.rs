@@ -58,6 +58,7 @@ pub(crate) struct Recipe {
     without: Vec<String>,
     /// Optimised code of earlier builds.
     pub(crate) cache: Cache,
+    /// What optimises the compiler's code.
     optimiser: Optimiser,
     /// Code of a small shader, by which another version of the compiler is known.
     sample: String,
@@ -145,8 +146,8 @@ impl Recipe {
             let version = shaderc::SpirvVersion::V1_6;
             // What the compiler has just read, and all else that decides the code.
             let mut key = read.into_inner();
-            let settings = format!("{kind:?} {version:?} {:?} {} {:?}", self.without, self.sample, self.optimiser);
-            key.add(&settings);
+            let settings = format!("{kind:?} {version:?} {:?}", self.without);
+            [&*settings, &*self.sample, self.optimiser.version()].into_iter().for_each(|text| key.add(text));
             let code = [include_str!("compile.rs"), include_str!("compact.rs"), include_str!("optimise.rs")];
             code.iter().for_each(|code| key.add(code));
             let unread = RefCell::new(Key::new());

@@ -391,7 +391,7 @@ fn spirv_file(program: &str, stage: &Stage) -> String {
 }
 
 /// Writes the SPIR-V of a program's stages, in the host's byte order. The code includes it as bytes: numbers in its
-/// text, 16 MB in all, took every check and build 3 s more.
+/// text, 16 MB in all, took every check and build some 3 s more.
 pub(crate) fn write_spirv(folder: &Path, name: &str, program: &Program) -> Result<()> {
     for stage in &program.stages {
         let path = folder.join(spirv_file(name, stage));

@@ -28,11 +28,11 @@ const OF_FUNCTIONS: [&str; 14] = [
     "--eliminate-dead-code-aggressive",
 ];
 
-/// Which optimiser there is; a part of the key of kept code.
-#[derive(Debug)]
+/// Which optimiser there is.
 pub(crate) enum Optimiser {
     /// The program `spirv-opt`, with what it says about its version.
-    Program(#[allow(dead_code, reason = "printed into the key")] String),
+    Program(String),
+    /// shaderc's own.
     OfCompiler,
 }
 
@@ -42,6 +42,14 @@ impl Optimiser {
         match version.ok().filter(|known| known.status.success()) {
             Some(known) => Self::Program(String::from_utf8_lossy(&known.stdout).into_owned()),
             None => Self::OfCompiler,
+        }
+    }
+
+    /// What distinguishes its code from another one's.
+    pub(crate) fn version(&self) -> &str {
+        match self {
+            Self::Program(version) => version,
+            Self::OfCompiler => "",
         }
     }
 
