@@ -208,8 +208,7 @@ impl Budget {
             truth: Arc::new(truth),
         };
         let Interval { median, low, high } = chosen.error;
-        let nearest =
-            if possible { "" } else { " (no measured choice is sure to keep the limit; this one comes closest)" };
+        let nearest = if possible { String::new() } else { format!(" ({NEAREST})") };
         steps.tell(&format!(
             "{budget} {limit}: using \"{}\"{nearest}: {:.1} ms ({:.1} … {:.1}) and an error of {:.2} % ({:.2} … {:.2}) when measured; \
              simplified: {}",
@@ -225,6 +224,9 @@ impl Budget {
         Ok(chosen)
     }
 }
+
+/// What is said of a choice that may break its limit.
+const NEAREST: &str = "no measured choice is sure to keep the limit; this one comes closest";
 
 /// Reads a kept table and its reference.
 fn measured(folder: &Path, settings: &Settings) -> Result<(Table, Truth)> {
@@ -322,7 +324,7 @@ impl Chosen {
 
     /// A sentence about a budget that the picture did not keep; `None` where it was kept.
     pub(super) fn broken(&self) -> Option<String> {
-        let drawn = if self.possible { "" } else { "; no measured rungs keep this limit, and these come closest" };
+        let drawn = if self.possible { String::new() } else { format!("; {NEAREST}") };
         match (self.budget, self.took_ms, self.found_error) {
             ("within", Some(ms), _) if ms > self.limit => {
                 Some(format!("--within {}: the picture took {ms:.1} ms of GPU time{drawn}", self.limit))

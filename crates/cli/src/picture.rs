@@ -1,6 +1,7 @@
 //! Parts shared by all forms of `etalon render`: options, arbitrary output variables (AOV layers of an EXR), and
 //! warnings about a drawn picture.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
@@ -15,7 +16,7 @@ use etalon::frame::{Part, Rendered, Renderer, Settings};
 use etalon::image::{Aov, AovData, Picture, file, png};
 use etalon::plan::rungs::Indirect;
 use etalon::plan::{Knobs, Plan};
-use etalon::scene::Camera;
+use etalon::scene::{Camera, Scene};
 use etalon::share::AovPixel;
 use etalon::spectra;
 use etalon::upload::view::View;
@@ -166,6 +167,21 @@ impl RenderArgs {
     pub(super) fn spares_inputs(&self, option: &str, path: &Path) -> Result<()> {
         self.inputs().try_for_each(|input| differs(option, path, input))
     }
+
+    /// Refuses outputs that the scene's file names, such as its textures, once they are known.
+    ///
+    /// # Errors
+    /// Wrong usage: an output is one of these files.
+    pub(super) fn spares_files<'a>(&self, scene: &Scene, mut outputs: impl Iterator<Item = &'a Path>) -> Result<()> {
+        let files: BTreeSet<PathBuf> = scene.files.iter().filter_map(|file| whole(file)).collect();
+        let is_spared = |path: &Path| whole(path).is_none_or(|path| !files.contains(&path));
+        let check = |option: &str, path: &Path| {
+            ensure!(is_spared(path), "{option} {}: the scene has a file of this name", path.display());
+            Ok(())
+        };
+        usage(outputs.try_for_each(|path| check("--output", path)))?;
+        usage(self.report.iter().try_for_each(|report| check("--report", report)))
+    }
 }
 
 /// Layers of `--aov`.
@@ -260,16 +276,17 @@ pub(super) fn check_same_scene(path: &Path, scene: &str) -> Result<()> {
     Ok(())
 }
 
+/// The absolute path of a file, which need not exist; `None` where its folder does not.
+fn whole(path: &Path) -> Option<PathBuf> {
+    if let Ok(whole) = std::fs::canonicalize(path) {
+        return Some(whole);
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Some(std::fs::canonicalize(folder).ok()?.join(path.file_name()?))
+}
+
 /// Whether two paths name one file.
 pub(super) fn are_same(a: &Path, b: &Path) -> bool {
-    let whole = |path: &Path| {
-        if let Ok(whole) = std::fs::canonicalize(path) {
-            return Some(whole);
-        }
-        // A file that does not exist yet has a folder.
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(std::fs::canonicalize(folder).ok()?.join(path.file_name()?))
-    };
     a == b || whole(a).zip(whole(b)).is_some_and(|(a, b)| a == b)
 }
 

@@ -94,6 +94,7 @@ fn draw(args: &RenderArgs, quiet: bool) -> Result<ExitCode> {
     steps.step(&format!("loading {}", args.scene.label()), 1);
     let prune = if budget.is_some() { Prune::Nothing } else { args.picture.prune(&args.scene, &settings.knobs) };
     let mut setup = Setup::load(&args.scene, prune, &args.device)?;
+    args.spares_files(setup.opened.scene(), outputs.iter().map(|(path, _)| path.as_path()))?;
     phases.end("load");
     let mut chosen = None;
     if budget.is_none() {

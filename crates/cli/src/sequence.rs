@@ -164,27 +164,31 @@ fn check_writable(args: &RenderArgs, request: &SequenceRequest) -> Result<()> {
 /// Checks the files of all pictures from cameras of these names: each is another file, that can be written.
 fn check_pictures(args: &RenderArgs, request: &SequenceRequest, cameras: &[&str]) -> Result<()> {
     let mut all = BTreeSet::new();
-    for (pattern, _) in &request.outputs {
-        for (&camera, &frame) in
-            cameras.iter().flat_map(|camera| request.frames.iter().map(move |frame| (camera, frame)))
-        {
-            let path = pattern.path(frame, camera);
-            usage(args.spares_inputs("--output", &path))?;
-            usage(args.report.iter().try_for_each(|report| differs("--report", report, &path)))?;
-            if args.output.is_empty() {
-                check_same_scene(&path, &args.scene.scene)?;
-            }
-            // Of many frames in one folder the first and the last tell whether they can be written.
-            if Some(&frame) == request.frames.first() || Some(&frame) == request.frames.last() {
-                file::check_writable(&path)?;
-            }
-            let is_new = all.insert(path.clone());
-            let twice =
-                || anyhow!("--cameras: two pictures would be written to {}; name the cameras by index", path.display());
-            usage(if is_new { Ok(()) } else { Err(twice()) })?;
+    for (frame, path) in pictures_of(request, cameras) {
+        usage(args.spares_inputs("--output", &path))?;
+        usage(args.report.iter().try_for_each(|report| differs("--report", report, &path)))?;
+        if args.output.is_empty() {
+            check_same_scene(&path, &args.scene.scene)?;
         }
+        // Of many frames in one folder the first and the last tell whether they can be written.
+        if Some(&frame) == request.frames.first() || Some(&frame) == request.frames.last() {
+            file::check_writable(&path)?;
+        }
+        let is_new = all.insert(path.clone());
+        let twice =
+            || anyhow!("--cameras: two pictures would be written to {}; name the cameras by index", path.display());
+        usage(if is_new { Ok(()) } else { Err(twice()) })?;
     }
     Ok(())
+}
+
+/// Frame and file of each picture from cameras of these names.
+fn pictures_of<'a>(request: &'a SequenceRequest, cameras: &'a [&str]) -> impl Iterator<Item = (i32, PathBuf)> + 'a {
+    let frames = move |camera: &'a str| request.frames.iter().map(move |&frame| (camera, frame));
+    let shown = move || cameras.iter().flat_map(move |camera| frames(camera));
+    let of =
+        move |(pattern, _): &'a (Pattern, Format)| shown().map(|(camera, frame)| (frame, pattern.path(frame, camera)));
+    request.outputs.iter().flat_map(of)
 }
 
 /// The camera rotated about the axis `up` through `center` by the fraction `part` of a full turn.
@@ -281,10 +285,12 @@ pub fn run(args: &RenderArgs, quiet: bool, printed: &mut BTreeSet<PathBuf>) -> R
         }
         _ => cameras(&args.scene, names, &still, settings.size)?,
     };
+    let known: Vec<&str> = fixed.iter().map(|(name, _)| name.as_str()).collect();
     if !names.is_empty() {
-        let names: Vec<&str> = fixed.iter().map(|(name, _)| name.as_str()).collect();
-        check_pictures(args, &wanted, &names)?;
+        check_pictures(args, &wanted, &known)?;
     }
+    let outputs: Vec<PathBuf> = pictures_of(&wanted, &known).map(|(_, path)| path).collect();
+    args.spares_files(&still, outputs.iter().chain(&wanted.preview).map(PathBuf::as_path))?;
     let base_time = args.scene.time.0;
     // All pictures have the exposure of the scene at --time from the first camera, whichever of them are drawn here.
     let first = fixed.first().map(|(_, camera)| camera).ok_or_else(|| anyhow!("{}: no camera", still.name))?;

@@ -1,6 +1,7 @@
 //! `etalon render --shard` of one picture: draws the part of one process, and resumes a part that was stopped. See
 //! docs/farm.md.
 
+use std::iter;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -83,6 +84,7 @@ pub(super) fn run(args: &RenderArgs, shard: [u32; 2], quiet: bool) -> Result<Exi
     steps.step(&format!("loading {}", args.scene.label()), 1);
     let prune = args.picture.prune(&args.scene, &settings.knobs);
     let setup = Setup::load(&args.scene, prune, &args.device)?;
+    args.spares_files(setup.opened.scene(), iter::once(output.as_path()))?;
     args.picture.colour_of(setup.opened.scene(), &mut settings.knobs)?;
     setup.opened.warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
     let camera = args.scene.choose_camera(setup.opened.scene(), settings.size)?;

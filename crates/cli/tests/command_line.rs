@@ -382,6 +382,37 @@ fn no_picture_replaces_one_of_another_scene_unasked() {
 }
 
 #[test]
+fn no_picture_replaces_a_texture_of_its_scene() {
+    let folder = folder();
+    let at = folder.path();
+    // Every picture of this scene is named like one of its textures.
+    etalon(at, &[&["render", "scene.glb", "-o", "paint.0000.png"], &SMALL[..]].concat(), &HASTY).succeeded();
+    let paint = std::fs::read(at.join("paint.0000.png")).expect("a picture");
+    triangle(at, |json| {
+        json["images"] = json!([{ "uri": "paint.0000.png" }]);
+        json["textures"] = json!([{ "source": 0 }]);
+        json["materials"] = json!([{ "emissiveTexture": { "index": 0 }, "emissiveFactor": [1, 1, 1] }]);
+        json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    });
+    std::fs::write(at.join("scene.mtl"), "newmtl paint\nmap_Kd paint.0000.png\n").expect("a library");
+    let object = "mtllib scene.mtl\nusemtl paint\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    std::fs::write(at.join("scene.obj"), object).expect("a scene");
+    for scene in ["scene.glb", "scene.obj"] {
+        for (outputs, named) in [
+            (&["-o", "paint.0000.png"][..], "--output paint.0000.png: the scene has a file of this name"),
+            (&["-o", "./paint.0000.png", "--shard", "1/2"], "--output ./paint.0000.png"),
+            (&["-o", "paint.{frame:04}.png", "--turntable", "2"], "--output paint.0000.png"),
+            (&["-o", "out.png", "--report", "paint.0000.png"], "--report paint.0000.png"),
+        ] {
+            etalon(at, &[&["render", scene], outputs, &SMALL].concat(), &HASTY).failed(2, named);
+        }
+    }
+    let library = ["render", "scene.obj", "-o", "out.png", "--report", "scene.mtl"];
+    etalon(at, &[&library, &SMALL[..]].concat(), &HASTY).failed(2, "--report scene.mtl: the scene has a file");
+    assert_eq!(std::fs::read(at.join("paint.0000.png")).expect("a picture"), paint);
+}
+
+#[test]
 fn the_last_line_says_what_was_drawn() {
     let folder = folder();
     let draw = |arguments: &[&str]| {

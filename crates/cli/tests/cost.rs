@@ -104,6 +104,10 @@ fn a_run_is_what_its_commands_draw() {
     let says_most = mostly.iter().any(|says| settings.contains(says));
     assert!(settings.contains("you lose") && says_most, "{settings:.2000}");
     assert!(!settings.contains("<b>light-sampler="), "{settings:.2000}");
+    // The heading of the cards says what the first sentence says.
+    let [none, undecided] =
+        ["No setting can be recommended", "none of them recommended"].map(|says| settings.contains(says));
+    assert_eq!(none, undecided, "{settings:.2000}");
     let csv = std::fs::read_to_string(at.join("a/cost.csv")).expect("cost.csv");
     assert_eq!(csv.lines().count(), points.len() + 1);
 

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use gltf::json::{self, Root};
 
 use super::names::by_name_or_index;
-use super::uri::resolve;
+use super::uri::{file, resolve};
 
 /// A glTF file with its buffers in memory.
 pub(crate) struct Document<'a> {
@@ -83,6 +83,13 @@ impl<'a> Document<'a> {
     /// The content of a URI: `data:` or a path relative to the file.
     pub(crate) fn resolve(&self, uri: &str) -> Result<Vec<u8>> {
         resolve(uri, &self.folder)
+    }
+
+    /// Files that the document names, of buffers and images.
+    pub(crate) fn files(&self) -> Vec<PathBuf> {
+        let buffers = self.root.buffers.iter().filter_map(|buffer| buffer.uri.as_ref());
+        let all = buffers.chain(self.root.images.iter().filter_map(|image| image.uri.as_ref()));
+        all.filter(|uri| !uri.starts_with("data:")).filter_map(|uri| file(uri, &self.folder).ok()).collect()
     }
 }
 

@@ -133,6 +133,7 @@ fn read_posed(
         cameras,
         duration: nodes.duration,
         outline,
+        files: document.files(),
         unread,
         warnings: warnings.into_iter().map(|w| format!("{file}: {w}")).collect(),
     })

@@ -40,7 +40,7 @@ mod uri;
 pub mod wavelengths;
 
 use std::io::Read as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use glam::{DAffine3, DVec3};
@@ -239,6 +239,8 @@ pub struct Scene {
     pub duration: Option<f64>,
     /// What the file contains, for lists to choose from.
     pub outline: Outline,
+    /// Files that the scene's own file names: buffers, images, material libraries.
+    pub files: Vec<PathBuf>,
     /// Textures and texture coordinates that were pruned as unused, one sentence each with the reason.
     pub unread: Vec<String>,
     /// Faults that reading worked around: one sentence each with the file, the place and the consequence.

@@ -136,6 +136,7 @@ struct ObjReader {
     materials: Vec<Material>,
     by_name: HashMap<String, usize>,
     pictures: Vec<ObjPicture>,
+    libraries: Vec<PathBuf>,
     warnings: Vec<String>,
     /// A material library is missing; this warning explains unknown material names, too.
     library_missing: bool,
@@ -282,6 +283,7 @@ impl ObjReader {
         } else {
             names.split_whitespace().map(|name| self.folder.join(clean(name))).collect()
         };
+        self.libraries.extend_from_slice(&paths);
         for path in paths {
             match fs::read(&path) {
                 Ok(bytes) => self
@@ -368,9 +370,11 @@ impl ObjReader {
         }
         let groups = std::mem::take(&mut self.groups);
         let unread = self.prune_unused(options.prune, &groups);
+        let pictures = self.pictures.iter().flat_map(|picture| [&picture.color, &picture.alpha]).flatten();
+        let files = self.libraries.iter().chain(pictures).cloned().collect();
         let images = self.decode(options.missing)?;
         let built: Vec<(Mesh, Vec<Stroke>, Vec<String>)> = groups.into_par_iter().map(|g| self.build(g)).collect();
-        let mut scene = Scene { images, unread, warnings: self.warnings, ..Scene::default() };
+        let mut scene = Scene { images, files, unread, warnings: self.warnings, ..Scene::default() };
         let mut strokes = Vec::new();
         for (mesh, lines, warnings) in built {
             scene.warnings.extend(warnings);

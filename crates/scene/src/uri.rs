@@ -3,7 +3,7 @@
 //! Read glTF 2.0 section 2.8 (URIs) and RFC 4648 (Base64).
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 
@@ -17,6 +17,12 @@ pub(crate) fn resolve(uri: &str, folder: &Path) -> Result<Vec<u8>> {
     if let Some(data) = uri.strip_prefix("data:") {
         return decode_data_uri(data).with_context(|| format!("the URI \"{}\"", short_uri(uri)));
     }
+    let path = file(uri, folder)?;
+    fs::read(&path).map_err(|error| anyhow!("{}: {}", path.display(), etalon_image::file::cause(&error)))
+}
+
+/// The file that a URI other than `data:` names; paths are relative to `folder`.
+pub(crate) fn file(uri: &str, folder: &Path) -> Result<PathBuf> {
     if let Some((scheme, _)) = uri.split_once(':')
         && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
         && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
@@ -31,8 +37,7 @@ pub(crate) fn resolve(uri: &str, folder: &Path) -> Result<Vec<u8>> {
         "the URI \"{}\" is an absolute path; only relative ones are read",
         short_uri(uri)
     );
-    let path = folder.join(relative.as_ref());
-    fs::read(&path).map_err(|error| anyhow!("{}: {}", path.display(), etalon_image::file::cause(&error)))
+    Ok(folder.join(relative.as_ref()))
 }
 
 fn decode_data_uri(data: &str) -> Result<Vec<u8>> {

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use winit::dpi::PhysicalSize;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 #[cfg(all(unix, not(target_os = "macos")))]
@@ -570,11 +570,9 @@ impl OpenWindow {
                 // A picture of one time is saved.
                 self.state.clock.playing = false;
                 let (layer, wipe) = (self.state.layer, self.state.wipe);
-                if let Some(path) = saved_as(&path) {
-                    self.saves.push(PendingSave { path, layer, wipe, of: None, is_told: false });
-                } else {
-                    let name = path.display();
-                    self.state.notices.fail(format!("{name} is not written: only .png and .exr are written"));
+                match saved_as(&path) {
+                    Ok(path) => self.saves.push(PendingSave { path, layer, wipe, of: None, is_told: false }),
+                    Err(error) => self.state.notices.fail(error.to_string()),
                 }
             }
             Action::CopyPicture => match self.picture(seen) {
@@ -794,10 +792,20 @@ impl OpenWindow {
     }
 }
 
-/// The file that a picture is saved as: PNG without an ending; `None` for the ending of another format.
-fn saved_as(path: &Path) -> Option<PathBuf> {
-    let Some(ending) = path.extension() else { return Some(path.with_extension("png")) };
-    ["png", "exr"].iter().any(|known| ending.eq_ignore_ascii_case(known)).then(|| path.to_owned())
+/// The file that a picture is saved as: PNG without an ending.
+///
+/// # Errors
+/// Another format's ending, or a PNG that exists: the dialog asks before it replaces the file of a name, but does not
+/// know of the ending that is added.
+fn saved_as(path: &Path) -> Result<PathBuf> {
+    let Some(ending) = path.extension() else {
+        let png = path.with_extension("png");
+        ensure!(!png.exists(), "{} exists and is not replaced: give its whole name to replace it", png.display());
+        return Ok(png);
+    };
+    let is_known = ["png", "exr"].iter().any(|known| ending.eq_ignore_ascii_case(known));
+    ensure!(is_known, "{} is not written: only .png and .exr are written", path.display());
+    Ok(path.to_owned())
 }
 
 /// Title, size and name of the window: the size that is asked for, or that of the last run, if the screen has room.
@@ -830,9 +838,14 @@ mod tests {
 
     #[test]
     fn pictures_have_the_format_of_their_ending() {
-        let saved = |name: &str| saved_as(Path::new(name)).map(|path| path.display().to_string());
+        let saved = |name: &str| saved_as(Path::new(name)).ok().map(|path| path.display().to_string());
         assert_eq!(saved("a folder.d/a"), Some("a folder.d/a.png".to_owned()));
         assert_eq!(["a.PNG", "b.exr"].map(saved), ["a.PNG", "b.exr"].map(|name| Some(name.to_owned())));
         assert_eq!(["a.jpg", "b.png.txt"].map(saved), [None, None]);
+        let folder = tempfile::tempdir().expect("a folder");
+        let asked = folder.path().join("a");
+        assert_eq!(saved_as(&asked).expect("a new file"), folder.path().join("a.png"));
+        std::fs::write(folder.path().join("a.png"), b"a picture").expect("a file");
+        assert!(saved_as(&asked).expect_err("a file of before").to_string().contains("is not replaced"));
     }
 }

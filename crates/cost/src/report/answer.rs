@@ -48,16 +48,25 @@ fn recommended(table: &Table) -> Vec<(Vec<&str>, &Point)> {
     all
 }
 
+/// The setting `balanced` among the recommended ones.
+fn balanced<'a>(all: &[(Vec<&str>, &'a Point)]) -> Option<&'a Point> {
+    all.iter().find(|(settings, _)| settings.contains(&"balanced")).map(|(_, point)| *point)
+}
+
+/// True when the error of the balanced setting is known, so that it can be recommended.
+fn is_decided(table: &Table, balanced: &Point) -> bool {
+    table.reference.converged || balanced.name == REFERENCE || balanced.error() > table.reference.resolution
+}
+
 /// The recommendation in a sentence.
 pub(super) fn lead(table: &Table) -> Markup {
     let all = recommended(table);
-    let balanced = all.iter().find(|(settings, _)| settings.contains(&"balanced"));
-    let Some((_, point)) = balanced else {
+    let Some(point) = balanced(&all) else {
         return html! { "No picture is faster than the reference: there is nothing to choose." };
     };
     let r = &table.reference;
     let [lacks, remedy] = r.shortcoming(table.reference_samples.is_some());
-    if !r.converged && point.name != REFERENCE && point.error() <= r.resolution {
+    if !is_decided(table, point) {
         return html! {
             "No setting can be recommended yet: the " (words::link("reference", "reference")) " " (lacks) ", and no "
             (words::link("error", "error")) " below " (percent(r.resolution)) " is significant; " (remedy) "."
@@ -78,7 +87,9 @@ pub(super) fn lead(table: &Table) -> Markup {
 
 /// The recommended settings, side by side.
 pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
-    let cards = recommended(table)
+    let all = recommended(table);
+    let decided = balanced(&all).is_none_or(|point| is_decided(table, point));
+    let cards = all
         .into_iter()
         .map(|(settings, point)| {
             let command = at_size(table, point).map_or(&point.command, |(_, at)| &at.command);
@@ -113,7 +124,8 @@ pub(super) fn settings(table: &Table, folder: &Path) -> Result<Markup> {
         .collect::<Result<Vec<Markup>>>()?;
     Ok(html! {
         section #settings {
-            h2 { "Recommended settings" }
+            h2 { @if decided { "Recommended settings" } @else { "Settings so far, none of them recommended" } }
+            @if !decided { p { "Their errors are not known well enough to choose by. A longer run may put others in their places." } }
             p { "Each setting is a list of choices, as in refraction=off: a " (words::link("rung", "knob and its rung")) ". " b { "quick" } " is the fastest, or a slower one with far less error for less than twice its time. " b { "balanced" } " has nearly the least error (within " (plain(100.0 * (WORTH - 1.0))) " %) that " (plain(DEARER)) " times the time of quick can buy. " b { "exact" } " has the least error, whatever its time. In parentheses is the error that a more exact choice takes away; these do not add up to the whole." }
             div.settings { @for card in &cards { (card) } }
         }
