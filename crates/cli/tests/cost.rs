@@ -6,6 +6,7 @@ mod program;
 
 use std::path::Path;
 
+use etalon::image::png::decode_png_with;
 use program::{HASTY, etalon};
 use serde_json::Value;
 
@@ -269,8 +270,17 @@ fn one_approximation_has_two_lines_and_a_verdict() {
     let json: Value = serde_json::from_str(&json).expect("JSON");
     let error = |end: &str| number(&json["price"]["shown_delta"][end]).sqrt();
     assert!(json["price"]["error_told"] == true && error("low") > 0.05 && error("high") < 0.1, "{json}");
-    let said = compare("study:radiance", "absorption=off,path", &["--set", "samples=1"]).succeeded().stdout;
+    let transparent = ["--set", "samples=1", "--background", "transparent", "-o", "pair"];
+    let said = compare("study:radiance", "absorption=off,path", &transparent).succeeded().stdout;
     assert!(said.contains("bit-identical"), "{said}");
+    // The pictures are those that `render` writes: transparent ones have alpha.
+    for (rung, words) in [("off", ["--set", "absorption=off"]), ("path", ["--set", "absorption=path"])] {
+        let render = ["render", "study:radiance", "--size", "64x36", "--device", "cpu", "-o", "one.png"];
+        etalon(at, &[&render, &words[..], &transparent[..4]].concat(), &HASTY).succeeded();
+        let [one, pair] = ["one.png".to_owned(), format!("pair/absorption-{rung}.png")]
+            .map(|name| decode_png_with(&std::fs::read(at.join(name)).expect("a picture")).expect("a PNG").0.rgba);
+        assert!(one == pair && one.iter().any(|pixel| pixel[3] == 0), "{rung}");
+    }
     let global = ["--model", "global", "--set", "samples=4", "--json"];
     let json: Value =
         serde_json::from_str(&compare("study:cornell", "interfaces=1,32", &global).succeeded().stdout).expect("JSON");

@@ -70,8 +70,9 @@ pub fn compare_rungs(bench: &Bench<'_>, knobs: &Knobs, wanted: &str) -> Result<C
     let measured = bench.measure(&mut warm, Some((&mut exact, &truth)), ENOUGH_MS)?;
     let shown = |display: &etalon::image::png::Display| AnyPicture::Display(display.clone());
     let flip = compare(Metric::Flip, &shown(&truth.display), &shown(&measured.display))?;
+    let has_alpha = bench.settings.view_transform().background.is_none();
     let png = |display: &etalon::image::png::Display| {
-        encode_png(display.width, display.height, display.rgba.as_flattened(), false)
+        encode_png(display.width, display.height, display.rgba.as_flattened(), has_alpha)
     };
     let pictures =
         [png(&measured.display)?, png(&truth.display)?, encode_png(flip.width, flip.height, &map_rgba(&flip), false)?];

@@ -1,5 +1,5 @@
-//! Arithmetic as inexact as Vulkan allows: SPIR-V in which divisions, roots, exponentials, logarithms and trigonometric
-//! functions are off by a number of units in the last place.
+//! Inexact arithmetic within what Vulkan allows: SPIR-V in which divisions, roots, exponentials, logarithms and
+//! trigonometric functions are off by a number of units in the last place.
 //!
 //! Read the Vulkan specification, appendix Vulkan Environment for SPIR-V, section Precision and Operation of SPIR-V
 //! Instructions: 2.5 ulp for division, 2 for `inversesqrt`, whose reciprocal is `sqrt`, 3 + 2|x| for `exp2`, 3 for

@@ -284,6 +284,10 @@ impl Description {
         lowered!(&self.limits, properties, max_push_descriptors = "maxPushDescriptors");
     }
 
+    pub(crate) fn lower_properties_1_3(&self, properties: &mut vk::PhysicalDeviceVulkan13Properties<'_>) {
+        lowered!(&self.limits, properties, max_buffer_size = "maxBufferSize");
+    }
+
     pub(crate) fn lower_subgroups(&self, properties: &mut vk::PhysicalDeviceVulkan11Properties<'_>) {
         if self.without_subgroup_arithmetic {
             properties.subgroup_supported_operations &= !vk::SubgroupFeatureFlags::ARITHMETIC;

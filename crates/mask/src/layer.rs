@@ -204,6 +204,9 @@ unsafe extern "system" fn properties2(device: vk::PhysicalDevice, to: *mut vk::P
                 vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES => {
                     description.lower_subgroups(&mut *at.cast())
                 }
+                vk::StructureType::PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES => {
+                    description.lower_properties_1_3(&mut *at.cast());
+                }
                 vk::StructureType::PHYSICAL_DEVICE_PUSH_DESCRIPTOR_PROPERTIES_KHR => {
                     description.lower_push_descriptors(&mut *at.cast());
                 }

@@ -56,7 +56,7 @@ pub struct Speed {
     pub sampled_image: f64,
     /// Millions of atomic additions per second to 256 counters.
     pub atomics: f64,
-    /// Median microseconds of a submission that fills four bytes, until the host knows of its end.
+    /// Median microseconds of a submission that fills 16 bytes, until the host knows of its end.
     pub submission_us: f64,
     /// Rays of paths, by traversal.
     pub rays: Vec<RaySpeed>,
@@ -225,12 +225,12 @@ pub fn measure(device: &Arc<Device>, bytes: u64, scene: &str, size: [u32; 2], mo
         frame.copy_buffer("copy", &loads.vectors, &to, bytes);
         Ok(())
     })?;
-    let four_bytes = Buffer::new(device, "four bytes", 4, Place::Device)?;
+    let few_bytes = Buffer::new(device, "few bytes", 16, Place::Device)?;
     let mut submissions = (0..SUBMISSIONS)
         .map(|_| {
             let begun = Instant::now();
             let mut frame = Frame::new(device);
-            frame.fill("four bytes", &four_bytes, 0);
+            frame.fill("few bytes", &few_bytes, 0);
             frame.finish()?;
             Ok(begun.elapsed().as_secs_f64() * 1e6)
         })

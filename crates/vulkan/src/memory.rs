@@ -137,6 +137,10 @@ impl Buffer {
             device.check_bound(name, bytes)?;
         }
         let texels = texels.filter(|_| device.offers().texel_buffers);
+        let largest = device.offers().max_buffer_bytes;
+        if bytes > largest {
+            bail!(TooLarge { what: creating(), limit: format!("has buffers of at most {largest} bytes") });
+        }
         let most = u64::from(device.limits.max_texel_buffer_elements);
         if let Some(format) = texels
             && bytes / texel_bytes(format) > most

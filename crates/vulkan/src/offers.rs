@@ -26,6 +26,8 @@ pub struct Offers {
     pub keeps_specials: bool,
     /// f32 arithmetic rounds to nearest even for shaders that request it.
     pub rounds_to_even: bool,
+    /// Largest size of a buffer in bytes (`maxBufferSize`).
+    pub max_buffer_bytes: u64,
 }
 
 impl Offers {
@@ -41,7 +43,9 @@ impl Offers {
         let mut push = vk::PhysicalDevicePushDescriptorPropertiesKHR::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut v11).push_next(&mut v12);
+        let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+        let mut properties =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut v11).push_next(&mut v12).push_next(&mut v13);
         if has_push {
             properties = properties.push_next(&mut push);
         }
@@ -68,6 +72,7 @@ impl Offers {
             tells_compiled: executables.pipeline_executable_info == vk::TRUE,
             keeps_specials: v12.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE,
             rounds_to_even: v12.shader_rounding_mode_rte_float32 == vk::TRUE,
+            max_buffer_bytes: v13.max_buffer_size,
         }
     }
 }
