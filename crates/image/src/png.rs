@@ -7,6 +7,8 @@ use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
 
+use super::decode::{Largest, UnknownKind, rgba8, size};
+
 /// A picture of display values, after tone mapping.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Display {
@@ -128,32 +130,30 @@ pub fn encode_animation(pictures: &[Display], [seconds, of]: [u16; 2]) -> Result
 }
 
 /// Reads a PNG, JPEG or WebP as 8-bit sRGB; the content decides, not the extension.
+/// See [`rgba8`].
 ///
-/// Sixteen-bit samples are rounded to eight, grey becomes three equal colours, palettes are resolved, missing alpha
-/// is 255. Colour profiles are not applied.
+/// # Errors
+/// When the file cannot be read or decoded.
 pub fn read_display(path: &Path) -> Result<Display> {
     let bytes = super::file::read(path)?;
     decode_display(&bytes).with_context(|| format!("reading {}", path.display()))
 }
 
 /// [`read_display`] for bytes in memory.
+///
+/// # Errors
+/// When the bytes cannot be decoded.
 pub fn decode_display(bytes: &[u8]) -> Result<Display> {
-    let mut reader = ::image::ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-    let known = [::image::ImageFormat::Png, ::image::ImageFormat::Jpeg, ::image::ImageFormat::WebP];
-    ensure!(
-        reader.format().is_some_and(|format| known.contains(&format)),
-        "the contents are not a picture of a known kind (OpenEXR for radiance; PNG, JPEG or WebP for display values)"
-    );
-    let mut limits = ::image::Limits::default();
-    limits.max_alloc = Some(super::MAX_PIXELS * 8);
-    reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(|error| anyhow!("{error}"))?;
-    let (width, height) = ::image::ImageDecoder::dimensions(&decoder);
+    let largest = Largest { side: u32::MAX, bytes: super::MAX_PIXELS * 8 };
+    let [width, height] = size(bytes, largest).map_err(|error| match error.is::<UnknownKind>() {
+        true => anyhow!("the contents are not a picture of a known kind (OpenEXR for radiance; PNG, JPEG or WebP for display values)"),
+        false => error,
+    })?;
     ensure!(
         u64::from(width) * u64::from(height) <= super::MAX_PIXELS,
         "{width}x{height} pixels are too many; {} are the most that are read",
         super::MAX_PIXELS
     );
-    let decoded = ::image::DynamicImage::from_decoder(decoder).map_err(|error| anyhow!("{error}"))?.into_rgba8();
-    Ok(Display { width, height, rgba: decoded.as_raw().as_chunks::<4>().0.to_vec() })
+    let (_, rgba) = rgba8(bytes, largest)?;
+    Ok(Display { width, height, rgba: rgba.as_chunks::<4>().0.to_vec() })
 }

@@ -3,19 +3,17 @@
 //!
 //! Read KHR_texture_basisu and the KTX 2.0 specification.
 
-use std::io::Cursor;
-
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
-use image::{ImageFormat, ImageReader, Limits};
+use etalon_image::decode::{Largest, UnknownKind, rgba8, size};
 
 use super::document::view_of;
 use super::{Image, Material, Meaning, MissingImages};
 
 /// Largest width and height in texels, which every Vulkan 1.3 device of interest supports for a 2D image.
 const MAX_SIDE: u32 = 16_384;
-/// Largest memory in bytes for decoding one image.
-const MAX_DECODE_BYTES: u64 = 2 << 30;
+/// Largest image to decode.
+const LARGEST: Largest = Largest { side: MAX_SIDE, bytes: 2 << 30 };
 
 /// The end of the warning about an image that a checker replaces.
 pub const REPLACED: &str = "a checker stands in its place";
@@ -91,24 +89,9 @@ impl MissingImages {
     }
 }
 
-fn reader(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>> {
-    // The magic bytes decide: files often have the wrong MIME type or extension.
-    let format = image::guess_format(bytes).ok();
-    let Some(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP)) = format else {
-        bail!("the data is not PNG, JPEG, WebP or KTX2");
-    };
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    limits.max_alloc = Some(MAX_DECODE_BYTES);
-    reader.limits(limits);
-    Ok(reader)
-}
-
-/// An error in one sentence: decoders write several lines and repeat their sources.
-fn refusal(what: &str, error: &image::ImageError) -> anyhow::Error {
-    anyhow!("{what}: {}", error.to_string().split_whitespace().collect::<Vec<_>>().join(" "))
+/// An error of the decoders, which do not know of KTX2.
+fn refusal(error: anyhow::Error) -> anyhow::Error {
+    if error.is::<UnknownKind>() { anyhow!("the data is not PNG, JPEG, WebP or KTX2") } else { error }
 }
 
 /// Place of offset and length of the key/value data in the header of a KTX2 file.
@@ -195,12 +178,11 @@ pub(crate) fn decode(name: String, bytes: &[u8]) -> Result<Image> {
     if bytes.starts_with(KTX2_MAGIC) {
         return decode_ktx2(name, bytes);
     }
-    let picture = reader(bytes)?.decode().map_err(|e| refusal("the picture cannot be decoded", &e))?.into_rgba8();
-    let (width, height) = picture.dimensions();
+    let ([width, height], rgba) = rgba8(bytes, LARGEST).map_err(refusal)?;
     if width == 0 || height == 0 {
         bail!("the picture has no pixels");
     }
-    Ok(Image { name, width, height, rgba: picture.into_raw().into() })
+    Ok(Image { name, width, height, rgba: rgba.into() })
 }
 
 /// Reads the header only, enough to recognise a supported image.
@@ -208,6 +190,5 @@ pub(crate) fn probe(bytes: &[u8]) -> Result<()> {
     if bytes.starts_with(KTX2_MAGIC) {
         return ktx2_size(bytes).map(drop);
     }
-    reader(bytes)?.into_dimensions().map_err(|e| refusal("the picture's header cannot be read", &e))?;
-    Ok(())
+    size(bytes, LARGEST).map(drop).map_err(refusal)
 }
