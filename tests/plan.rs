@@ -11,7 +11,7 @@ use etalon::plan::{Architecture, Knobs, Plan};
 use etalon::scene::environment::Environment;
 use etalon::scene::lobe::{ANISOTROPY, DIFFUSE_TRANSMISSION, IRIDESCENCE};
 use etalon::scene::material::{Sampler, TextureRef};
-use etalon::scene::{AlphaMode, Image, LightKind, Material, Scene, SigmaGrid};
+use etalon::scene::{AlphaMode, Extent, Image, Light, LightKind, Material, Scene, SigmaGrid};
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::{Gpu, bits};
 use etalon_testing::made::{Made, at, lambert, orthographic, unlit};
@@ -691,6 +691,47 @@ fn lights_out_of_range_are_no_lights() {
     let mut touching = ball(chalk(), None);
     touching.light([10.0; 3], lamp(-12.0, 11.1));
     assert_eq!(draw(&touching.0, None, &[]).plan.local_lights, 1);
+
+    // Nor do they call for bands of wavelengths, samples of areas or a hierarchy of lights.
+    let mut grey = Made::new("grey");
+    grey.add(Shape::sphere(1.0, 16), lambert([0.5; 3]), at(0.0, 0.0, 0.0));
+    grey.camera(DVec3::Z * 10.0, DVec3::ZERO, orthographic(1.5));
+    let with = |x, range| {
+        let mut made = grey.0.clone();
+        made.lights.extend((0..3).map(|_| Light {
+            name: "red".to_owned(),
+            color: [10.0, 1.0, 1.0],
+            spectrum: None,
+            extent: Some(Extent::Sphere { radius: 0.1 }),
+            kind: lamp(x, range),
+            proxy: false,
+        }));
+        let plan = draw(&made, None, &["lights=area:4", "colour=spectral:8"]).plan;
+        ["spectral rendering", "analytic area lights", "light hierarchy"].map(|name| state(&plan, name).0)
+    };
+    assert_eq!(with(-12.0, 10.9), ["not needed"; 3]);
+    assert_eq!(with(3.0, 10.0), ["used"; 3]);
+}
+
+/// A texture without colour needs no bands, with every factor that may be a colour.
+#[test]
+fn grey_textures_call_for_no_bands() {
+    for (rgba, expected) in [([90, 90, 90, 255], "not needed"), ([90, 90, 91, 255], "used")] {
+        let mut made = Made::new("grey");
+        let texture = Some(one_colour(&mut made, rgba));
+        let painted = Material {
+            base_color_texture: texture,
+            emissive_texture: texture,
+            emissive: [0.5; 3],
+            ..lambert([0.5; 3])
+        };
+        let sphere = Shape::sphere(1.0, 16);
+        made.add(sphere, painted, at(0.0, 0.0, 0.0));
+        made.camera(DVec3::Z * 10.0, DVec3::ZERO, orthographic(1.5));
+        let plan = draw(&made.0, None, &["colour=spectral:8"]).plan;
+        let (state, reason) = state(&plan, "spectral rendering");
+        assert_eq!(state, expected, "{rgba:?}: {reason}");
+    }
 }
 
 /// What alpha says by its values: a surface that blends with an alpha of 1 is planned and drawn as an opaque one, one

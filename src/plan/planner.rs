@@ -16,7 +16,7 @@ use super::surfaces::{
 };
 use super::work::{Attenuation, LightSamples, March, Paths, Plan, Rays, Screen, Stored};
 use crate::scene::lobe::{LOBES, SHEEN};
-use crate::scene::{AlphaMode, Light, LightKind, Material, Scene};
+use crate::scene::{AlphaMode, Bounds, Light, LightKind, Material, Scene};
 use crate::transport::emitters::{bounded, is_emitter};
 use crate::transport::layers::{SMOOTHEST, deflects, immerses, is_smooth};
 
@@ -40,6 +40,13 @@ struct Planner<'a> {
     decisions: Decisions,
     /// Path tracing is chosen; it replaces all other passes that light surfaces.
     paths: bool,
+    /// Box about what is drawn; `None` where nothing is.
+    bounds: Option<Bounds>,
+}
+
+/// Whether a light shines on some part of a box.
+fn lights(light: &Light, bounds: Option<Bounds>) -> bool {
+    light.shines() && bounds.is_none_or(|bounds| light.reaches(&bounds))
 }
 
 impl Plan {
@@ -49,7 +56,8 @@ impl Plan {
         let surfaces = Surfaces::of(scene, facts);
         let decisions = Decisions { forced: surroundings.forced, effects: Vec::new() };
         let paths = knobs.indirect == Indirect::Path;
-        let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions, paths };
+        let bounds = scene.bounds();
+        let mut planner = Planner { scene, facts, surfaces, knobs, surroundings, decisions, paths, bounds };
         let layers = planner.layers();
         let transmission = planner.transmission();
         let images = planner.mirror_images(&transmission);
@@ -282,13 +290,11 @@ impl Planner<'_> {
     }
 
     fn lights(&mut self, samples: LightSamples) -> Lights {
-        let Self { scene, surfaces, decisions, knobs, surroundings, paths, .. } = self;
+        let Self { scene, surfaces, decisions, knobs, surroundings, paths, bounds, .. } = self;
         let lit = surfaces.any(|m| !m.unlit);
-        let bounds = scene.bounds();
-        let reaches = |light: &Light| bounds.is_none_or(|bounds| light.reaches(&bounds));
         // The emissive surfaces behind a proxy light are lights themselves.
         let replaced = |light: &Light| light.proxy && samples.emitting;
-        let useful = |light: &Light| light.shines() && reaches(light) && !replaced(light);
+        let useful = |light: &Light| lights(light, *bounds) && !replaced(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
         // Black placeholder lights keep loops non-empty when lights are forced but absent. Beside real lights they
         // would waste shadow maps.
@@ -362,7 +368,7 @@ impl Planner<'_> {
     /// Light sampling. Paths sample all lights, and find emission of any kind; other models sample lights with an
     /// extent.
     fn light_samples(&mut self, followed: bool) -> LightSamples {
-        let Self { scene, surfaces, decisions, knobs, paths, .. } = self;
+        let Self { scene, surfaces, decisions, knobs, paths, bounds, .. } = self;
         let lit = surfaces.any(|m| !m.unlit && (*paths || scatters(m) || mirrors(m) || m.clearcoat > 0.0));
         let sends_light = |m: &Material| match *paths {
             true if m.unlit => m.base_color[..3] != [0.0; 3],
@@ -381,14 +387,15 @@ impl Planner<'_> {
         // Outside of path tracing forced samples of no light would change roundings of the loop over lights.
         let decide = if *paths { Decisions::decide_with } else { Decisions::decide_apart };
         let emitting = decide(decisions, EffectId::EmissiveLights, by_lights, cause);
-        let shaped = scene.lights.iter().find(|light| light.shines() && light.extent.is_some());
+        let shaped = scene.lights.iter().find(|light| lights(light, *bounds) && light.extent.is_some());
         let cause = match (lit, shaped) {
             (false, _) => Cause::against("no visible surface scatters or reflects light"),
             (_, None) => Cause::against("no light has an area"),
             (_, Some(light)) => Cause::of(format!("light \"{}\" has an area", light.name)),
         };
         let shaped = decide(decisions, EffectId::AreaLights, by_lights, cause);
-        let count = bounded(scene, emitting, |light| followed || (shaped && light.extent.is_some()));
+        let is_sampled = |light: &Light| followed || (shaped && light.extent.is_some());
+        let count = bounded(scene, emitting, |light| lights(light, *bounds) && is_sampled(light));
         let cause = match followed || emitting || shaped {
             false => Cause::against("no lights are sampled"),
             true => Cause::when(
@@ -448,21 +455,26 @@ impl Planner<'_> {
 
     /// Number of bands of wavelengths, and whether dispersion splits rays by wavelength.
     fn wavelengths(&mut self, transmission: &Transmission) -> (u32, bool) {
-        let Self { scene, surfaces, decisions, knobs, surroundings, .. } = self;
+        let Self { scene, surfaces, decisions, knobs, surroundings, bounds, .. } = self;
         let bands = knobs.colour.bands();
         let differ = |rgb: &[f32]| rgb[0] != rgb[1] || rgb[1] != rgb[2];
-        let light =
-            scene.lights.iter().find(|light| light.shines() && (light.spectrum.is_some() || differ(&light.color)));
-        let cause = surfaces.cause(by_wavelength, |m| {
-            match (&m.reflectance, &m.emission, &m.conductor) {
-                (Some(_), ..) => "has a spectral reflectance",
-                (_, Some(_), _) => "has an emission spectrum",
-                (.., Some(_)) => "is a conductor with n and kappa",
-                _ if m.dispersion.disperses(f64::from(m.ior)) => "has dispersion",
-                _ => "is coloured",
-            }
-            .to_owned()
-        });
+        let light = scene
+            .lights
+            .iter()
+            .find(|light| lights(light, *bounds) && (light.spectrum.is_some() || differ(&light.color)));
+        let cause = surfaces.cause(
+            |m| by_wavelength(m, &scene.images),
+            |m| {
+                match (&m.reflectance, &m.emission, &m.conductor) {
+                    (Some(_), ..) => "has a spectral reflectance",
+                    (_, Some(_), _) => "has an emission spectrum",
+                    (.., Some(_)) => "is a conductor with n and kappa",
+                    _ if m.dispersion.disperses(f64::from(m.ior)) => "has dispersion",
+                    _ => "is coloured",
+                }
+                .to_owned()
+            },
+        );
         let cause = match (cause.called_for, light, surroundings.environment && !surroundings.grey) {
             (true, ..) => cause,
             _ if surfaces.with_colours().is_some() => Cause::of("some vertices are coloured"),
