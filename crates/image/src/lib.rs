@@ -2,8 +2,8 @@
 //!
 //! A render results in a [`Picture`] of scene-linear radiance. [`exr`] stores it without loss, [`tone`] maps it to
 //! display values, and [`png`] stores those. [`decode`] reads pictures of other programs, [`metric`] compares two
-//! pictures, and [`mod@file`] writes files atomically. Nothing here uses Vulkan. Colours are linear Rec. 709 unless they
-//! are display values.
+//! pictures, and [`mod@file`] writes files atomically. Nothing here uses Vulkan. Colours are linear Rec. 709 unless
+//! they are display values.
 
 pub mod decode;
 pub mod exr;
