@@ -713,7 +713,7 @@ fn lights_out_of_range_are_no_lights() {
     assert_eq!(with(3.0, 10.0), ["used"; 3]);
 }
 
-/// A texture without colour needs no bands, with every factor that may be a colour.
+/// A texture without colour needs no bands, as a base colour and as emission.
 #[test]
 fn grey_textures_call_for_no_bands() {
     for (rgba, expected) in [([90, 90, 90, 255], "not needed"), ([90, 90, 91, 255], "used")] {

@@ -2,6 +2,8 @@
 //!
 //! Read docs/plan.md. The input is a scene in canonical form with its facts; the output is a [`Plan`].
 
+use std::cell::OnceCell;
+
 use super::architecture::Architecture;
 use super::effect::{Cause, Decisions, ForcedEffects, Verdict};
 use super::facts::{Facts, Surroundings};
@@ -45,7 +47,7 @@ struct Planner<'a> {
 }
 
 /// Whether a light shines on some part of a box.
-fn lights(light: &Light, bounds: Option<Bounds>) -> bool {
+fn shines_on(light: &Light, bounds: Option<Bounds>) -> bool {
     light.shines() && bounds.is_none_or(|bounds| light.reaches(&bounds))
 }
 
@@ -294,7 +296,7 @@ impl Planner<'_> {
         let lit = surfaces.any(|m| !m.unlit);
         // The emissive surfaces behind a proxy light are lights themselves.
         let replaced = |light: &Light| light.proxy && samples.emitting;
-        let useful = |light: &Light| lights(light, *bounds) && !replaced(light);
+        let useful = |light: &Light| shines_on(light, *bounds) && !replaced(light);
         let useful_lights = scene.lights.iter().filter(|light| useful(light)).count();
         // Black placeholder lights keep loops non-empty when lights are forced but absent. Beside real lights they
         // would waste shadow maps.
@@ -387,7 +389,7 @@ impl Planner<'_> {
         // Outside of path tracing forced samples of no light would change roundings of the loop over lights.
         let decide = if *paths { Decisions::decide_with } else { Decisions::decide_apart };
         let emitting = decide(decisions, EffectId::EmissiveLights, by_lights, cause);
-        let shaped = scene.lights.iter().find(|light| lights(light, *bounds) && light.extent.is_some());
+        let shaped = scene.lights.iter().find(|light| shines_on(light, *bounds) && light.extent.is_some());
         let cause = match (lit, shaped) {
             (false, _) => Cause::against("no visible surface scatters or reflects light"),
             (_, None) => Cause::against("no light has an area"),
@@ -395,7 +397,7 @@ impl Planner<'_> {
         };
         let shaped = decide(decisions, EffectId::AreaLights, by_lights, cause);
         let is_sampled = |light: &Light| followed || (shaped && light.extent.is_some());
-        let count = bounded(scene, emitting, |light| lights(light, *bounds) && is_sampled(light));
+        let count = bounded(scene, emitting, |light| shines_on(light, *bounds) && is_sampled(light));
         let cause = match followed || emitting || shaped {
             false => Cause::against("no lights are sampled"),
             true => Cause::when(
@@ -461,9 +463,16 @@ impl Planner<'_> {
         let light = scene
             .lights
             .iter()
-            .find(|light| lights(light, *bounds) && (light.spectrum.is_some() || differ(&light.color)));
+            .find(|light| shines_on(light, *bounds) && (light.spectrum.is_some() || differ(&light.color)));
+        let coloured: Vec<OnceCell<bool>> = vec![OnceCell::new(); scene.images.len()];
+        // Stops at the first texel with a colour, which most textures have near their start.
+        let looks = |image: usize| {
+            let mut texels = scene.images[image].rgba.as_chunks::<4>().0.iter();
+            texels.any(|[r, g, b, _]| r != g || g != b)
+        };
+        let is_coloured = |image: usize| *coloured[image].get_or_init(|| looks(image));
         let cause = surfaces.cause(
-            |m| by_wavelength(m, &scene.images),
+            |m| by_wavelength(m, is_coloured),
             |m| {
                 match (&m.reflectance, &m.emission, &m.conductor) {
                     (Some(_), ..) => "has a spectral reflectance",

@@ -4,7 +4,7 @@ use super::effect::Cause;
 use super::facts::Facts;
 use super::work::March;
 use crate::scene::lobe::SHEEN;
-use crate::scene::{AlphaMode, Image, Material, Meaning, Scene};
+use crate::scene::{AlphaMode, Material, Meaning, Scene};
 use crate::transport::layers::immerses;
 pub use crate::transport::layers::mirrors;
 
@@ -42,10 +42,8 @@ pub(super) fn scatters(material: &Material) -> bool {
     !material.unlit && (by_ground || by_lobes)
 }
 
-/// Whether the surface depends on wavelength.
-pub(super) fn by_wavelength(m: &Material, images: &[Image]) -> bool {
-    // Stops at the first texel with a colour, which most textures have near their start.
-    let is_coloured = |image: &Image| image.rgba.as_chunks::<4>().0.iter().any(|[r, g, b, _]| r != g || g != b);
+/// Whether the surface depends on wavelength; `is_coloured` tells of an image whether some texel is not grey.
+pub(super) fn by_wavelength(m: &Material, is_coloured: impl Fn(usize) -> bool) -> bool {
     let differ = |rgb: &[f32]| rgb[0] != rgb[1] || rgb[1] != rgb[2];
     differ(&m.base_color[..3])
         || differ(&m.emissive)
@@ -59,7 +57,7 @@ pub(super) fn by_wavelength(m: &Material, images: &[Image]) -> bool {
         || m.lobes().any(|(lobe, of)| lobe.colour(of).is_some_and(|colour| differ(&colour)))
         || m.lobes().any(|(lobe, of)| lobe.by_wavelength && lobe.is_on(of))
         || m.textures().any(|(.., meaning, texture)| {
-            meaning == Meaning::Color && texture.is_some_and(|texture| is_coloured(&images[texture.image]))
+            meaning == Meaning::Color && texture.is_some_and(|texture| is_coloured(texture.image))
         })
 }
 

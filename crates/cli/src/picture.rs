@@ -176,7 +176,7 @@ impl RenderArgs {
         let files: BTreeSet<PathBuf> = scene.files.iter().filter_map(|file| whole(file)).collect();
         let is_spared = |path: &Path| whole(path).is_none_or(|path| !files.contains(&path));
         let check = |option: &str, path: &Path| {
-            ensure!(is_spared(path), "{option} {}: the scene has a file of this name", path.display());
+            ensure!(is_spared(path), "{option} {}: the scene names this file; choose another name", path.display());
             Ok(())
         };
         usage(outputs.try_for_each(|path| check("--output", path)))?;

@@ -394,12 +394,13 @@ fn no_picture_replaces_a_texture_of_its_scene() {
         json["materials"] = json!([{ "emissiveTexture": { "index": 0 }, "emissiveFactor": [1, 1, 1] }]);
         json["meshes"][0]["primitives"][0]["material"] = json!(0);
     });
-    std::fs::write(at.join("scene.mtl"), "newmtl paint\nmap_Kd paint.0000.png\n").expect("a library");
+    std::fs::write(at.join("scene.mtl"), "newmtl paint\nmap_Kd paint.0000.png\nmap_Bump -bm 0.5 dents.png\n")
+        .expect("a library");
     let object = "mtllib scene.mtl\nusemtl paint\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     std::fs::write(at.join("scene.obj"), object).expect("a scene");
     for scene in ["scene.glb", "scene.obj"] {
         for (outputs, named) in [
-            (&["-o", "paint.0000.png"][..], "--output paint.0000.png: the scene has a file of this name"),
+            (&["-o", "paint.0000.png"][..], "--output paint.0000.png: the scene names this file"),
             (&["-o", "./paint.0000.png", "--shard", "1/2"], "--output ./paint.0000.png"),
             (&["-o", "paint.{frame:04}.png", "--turntable", "2"], "--output paint.0000.png"),
             (&["-o", "out.png", "--report", "paint.0000.png"], "--report paint.0000.png"),
@@ -407,8 +408,19 @@ fn no_picture_replaces_a_texture_of_its_scene() {
             etalon(at, &[&["render", scene], outputs, &SMALL].concat(), &HASTY).failed(2, named);
         }
     }
-    let library = ["render", "scene.obj", "-o", "out.png", "--report", "scene.mtl"];
-    etalon(at, &[&library, &SMALL[..]].concat(), &HASTY).failed(2, "--report scene.mtl: the scene has a file");
+    // Files that a scene names, read or not, and a buffer beside it.
+    let mut b = Builder::new();
+    let position = b.triangle();
+    let mesh = b.mesh(json!({ "attributes": { "POSITION": position } }));
+    b.root(json!({ "mesh": mesh }));
+    b.save_gltf(at, "my%20mesh.bin");
+    let glb = b.glb();
+    std::fs::write(at.join("my mesh.bin"), &glb[glb.len() - 36..]).expect("a buffer");
+    for (scene, named) in [("scene.obj", "scene.mtl"), ("scene.obj", "dents.png"), ("scene.gltf", "my mesh.bin")] {
+        let arguments = ["render", scene, "-o", "out.png", "--report", named];
+        let said = format!("--report {named}: the scene names this file; choose another name");
+        etalon(at, &[&arguments, &SMALL[..]].concat(), &HASTY).failed(2, &said);
+    }
     assert_eq!(std::fs::read(at.join("paint.0000.png")).expect("a picture"), paint);
 }
 

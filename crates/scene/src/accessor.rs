@@ -1,8 +1,6 @@
 //! glTF accessors: typed data from buffers, with every byte range checked before reading (glTF 2.0 sections 3.6.2 and
 //! 3.11).
 
-use std::borrow::Cow;
-
 use anyhow::{Context, Result, bail, ensure};
 use gltf::json::{
     accessor::{ComponentType, Type},
@@ -139,34 +137,45 @@ impl<'a> Accessor<'a> {
             _ => Type::Mat4,
         };
         ensure!(self.shape == expected, "accessor {} holds {:?} elements, not {expected:?}", self.index, self.shape);
-        if let Some(packed) = self.packed_f32() {
-            return Ok(packed);
-        }
-        Ok(in_elements(&self.components()))
+        let mut out = vec![[0.0; N]; self.count];
+        self.components(out.as_flattened_mut());
+        Ok(out)
     }
 
-    /// All components as floats, element after element.
-    fn components(&self) -> Vec<f32> {
+    /// Writes all components as floats to `out`, element after element.
+    fn components(&self, out: &mut [f32]) {
         use ComponentType::{F32, I8, I16, U8, U16, U32};
         match (self.component, self.normalized) {
-            (F32, _) => self.decode(f32::from_le_bytes),
-            (I8, true) => self.decode(|b: [u8; 1]| (f32::from(i8::from_le_bytes(b)) / 127.0).max(-1.0)),
-            (U8, true) => self.decode(|b: [u8; 1]| f32::from(b[0]) / 255.0),
-            (I16, true) => self.decode(|b: [u8; 2]| (f32::from(i16::from_le_bytes(b)) / 32767.0).max(-1.0)),
-            (U16, true) => self.decode(|b: [u8; 2]| f32::from(u16::from_le_bytes(b)) / 65535.0),
-            (U32, true) => self.decode(|b: [u8; 4]| (f64::from(u32::from_le_bytes(b)) / f64::from(u32::MAX)) as f32),
-            (I8, false) => self.decode(|b: [u8; 1]| f32::from(i8::from_le_bytes(b))),
-            (U8, false) => self.decode(|b: [u8; 1]| f32::from(b[0])),
-            (I16, false) => self.decode(|b: [u8; 2]| f32::from(i16::from_le_bytes(b))),
-            (U16, false) => self.decode(|b: [u8; 2]| f32::from(u16::from_le_bytes(b))),
-            (U32, false) => self.decode(|b: [u8; 4]| u32::from_le_bytes(b) as f32),
+            (F32, _) => match (self.base, &self.sparse) {
+                // Tightly packed floats, the usual case.
+                (Some((bytes, _)), None) if cfg!(target_endian = "little") && bytes.len() == size_of_val(out) => {
+                    bytemuck::cast_slice_mut::<f32, u8>(out).copy_from_slice(bytes);
+                }
+                _ => self.decode(out, f32::from_le_bytes),
+            },
+            (I8, true) => self.decode(out, |b: [u8; 1]| (f32::from(i8::from_le_bytes(b)) / 127.0).max(-1.0)),
+            (U8, true) => self.decode(out, |b: [u8; 1]| f32::from(b[0]) / 255.0),
+            (I16, true) => self.decode(out, |b: [u8; 2]| (f32::from(i16::from_le_bytes(b)) / 32767.0).max(-1.0)),
+            (U16, true) => self.decode(out, |b: [u8; 2]| f32::from(u16::from_le_bytes(b)) / 65535.0),
+            (U32, true) => {
+                self.decode(out, |b: [u8; 4]| (f64::from(u32::from_le_bytes(b)) / f64::from(u32::MAX)) as f32)
+            }
+            (I8, false) => self.decode(out, |b: [u8; 1]| f32::from(i8::from_le_bytes(b))),
+            (U8, false) => self.decode(out, |b: [u8; 1]| f32::from(b[0])),
+            (I16, false) => self.decode(out, |b: [u8; 2]| f32::from(i16::from_le_bytes(b))),
+            (U16, false) => self.decode(out, |b: [u8; 2]| f32::from(u16::from_le_bytes(b))),
+            (U32, false) => self.decode(out, |b: [u8; 4]| u32::from_le_bytes(b) as f32),
         }
     }
 
     /// All numbers of the elements one after the other, converted as [`Accessor::floats`] does.
     pub(crate) fn numbers(&self) -> Result<Vec<f32>> {
         match self.shape {
-            Type::Scalar | Type::Vec2 | Type::Vec3 | Type::Vec4 => Ok(self.components()),
+            Type::Scalar | Type::Vec2 | Type::Vec3 | Type::Vec4 => {
+                let mut out = vec![0.0; self.count * self.shape.multiplicity()];
+                self.components(&mut out);
+                Ok(out)
+            }
             other => bail!("accessor {} holds {other:?} elements, not numbers or vectors", self.index),
         }
     }
@@ -182,64 +191,42 @@ impl<'a> Accessor<'a> {
     /// Elements as one unsigned integer each.
     pub(crate) fn indices(&self) -> Result<Vec<u32>> {
         ensure!(self.shape == Type::Scalar, "accessor {} holds {:?} elements, not indices", self.index, self.shape);
-        Ok(match self.component {
-            ComponentType::U8 => self.decode(|b: [u8; 1]| u32::from(b[0])),
-            ComponentType::U16 => self.decode(|b: [u8; 2]| u32::from(u16::from_le_bytes(b))),
-            ComponentType::U32 => self.decode(u32::from_le_bytes),
+        let mut out = vec![0; self.count];
+        match self.component {
+            ComponentType::U8 => self.decode(&mut out, |b: [u8; 1]| u32::from(b[0])),
+            ComponentType::U16 => self.decode(&mut out, |b: [u8; 2]| u32::from(u16::from_le_bytes(b))),
+            ComponentType::U32 => self.decode(&mut out, u32::from_le_bytes),
             other => bail!("accessor {} holds {other:?} components, not unsigned indices", self.index),
-        })
+        }
+        Ok(out)
     }
 
     /// Joint indices, four per element.
     pub(crate) fn joints(&self) -> Result<Vec<[u16; 4]>> {
         ensure!(self.shape == Type::Vec4, "accessor {} holds {:?} elements, not joints", self.index, self.shape);
-        let joints: Vec<u16> = match self.component {
-            ComponentType::U8 => self.decode(|b: [u8; 1]| u16::from(b[0])),
-            ComponentType::U16 => self.decode(u16::from_le_bytes),
+        let mut out = vec![[0; 4]; self.count];
+        match self.component {
+            ComponentType::U8 => self.decode(out.as_flattened_mut(), |b: [u8; 1]| u16::from(b[0])),
+            ComponentType::U16 => self.decode(out.as_flattened_mut(), u16::from_le_bytes),
             other => bail!("accessor {} holds {other:?} components, not joint numbers", self.index),
-        };
-        Ok(in_elements(&joints))
-    }
-
-    /// The elements where they are tightly packed floats.
-    fn packed_f32<const N: usize>(&self) -> Option<Vec<[f32; N]>> {
-        let (bytes, stride) = self.base?;
-        let is_packed = self.component == ComponentType::F32 && self.sparse.is_none() && stride == 4 * N;
-        (cfg!(target_endian = "little") && is_packed).then(|| {
-            let mut out = vec![[0.0; N]; self.count];
-            bytemuck::cast_slice_mut::<f32, u8>(out.as_flattened_mut()).copy_from_slice(bytes);
-            out
-        })
-    }
-
-    /// All components, element after element.
-    fn decode<const SIZE: usize, T>(&self, component: impl Fn([u8; SIZE]) -> T) -> Vec<T> {
-        self.packed().as_chunks::<SIZE>().0.iter().map(|bytes| component(*bytes)).collect()
-    }
-
-    /// The elements one after the other, with the sparse ones in their places.
-    fn packed(&self) -> Cow<'a, [u8]> {
-        let size = self.component.size() * self.shape.multiplicity();
-        let mut packed = match self.base {
-            Some((bytes, stride)) if stride == size => Cow::Borrowed(bytes),
-            Some((bytes, stride)) => {
-                let mut packed = Vec::with_capacity(self.count * size);
-                bytes.chunks(stride).for_each(|element| packed.extend_from_slice(&element[..size]));
-                Cow::Owned(packed)
-            }
-            None => Cow::Owned(vec![0; self.count * size]),
-        };
-        if let Some(sparse) = &self.sparse {
-            let packed = packed.to_mut();
-            for (&i, bytes) in sparse.indices.iter().zip(sparse.values.chunks_exact(size)) {
-                packed[i * size..][..size].copy_from_slice(bytes);
-            }
         }
-        packed
+        Ok(out)
     }
-}
 
-/// Components as elements of `N` of them.
-fn in_elements<const N: usize, T: Copy>(components: &[T]) -> Vec<[T; N]> {
-    components.as_chunks::<N>().0.to_vec()
+    /// Writes all components to `out`, which holds zeros, element after element.
+    fn decode<const SIZE: usize, T>(&self, out: &mut [T], component: impl Fn([u8; SIZE]) -> T) {
+        let n = self.shape.multiplicity();
+        let write = |element: &mut [T], bytes: &[u8]| {
+            for (value, chunk) in element.iter_mut().zip(bytes.as_chunks::<SIZE>().0) {
+                *value = component(*chunk);
+            }
+        };
+        if let Some((bytes, stride)) = self.base {
+            out.chunks_exact_mut(n).zip(bytes.chunks(stride)).for_each(|(element, bytes)| write(element, bytes));
+        }
+        if let Some(sparse) = &self.sparse {
+            let values = sparse.values.chunks_exact(n * SIZE);
+            sparse.indices.iter().zip(values).for_each(|(&i, bytes)| write(&mut out[i * n..][..n], bytes));
+        }
+    }
 }

@@ -44,14 +44,16 @@ pub(crate) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Statements of MTL files that name textures, beside those that begin with `map_`.
+const TEXTURES: [&str; 5] = ["norm", "bump", "disp", "decal", "refl"];
+
 /// Keywords that are followed by a name, which may contain a number sign.
-const NAMES: [&str; 7] = ["newmtl", "usemtl", "mtllib", "norm", "o", "g", "s"];
+const NAMES: [&str; 6] = ["newmtl", "usemtl", "mtllib", "o", "g", "s"];
 
 /// Where a comment begins in a line: at a number sign, but behind a name only where a space follows it.
 fn comment(line: &str) -> Option<usize> {
     let keyword = line.split_whitespace().next().unwrap_or_default();
-    let is_named =
-        NAMES.contains(&keyword) || keyword.starts_with("map_") || ["bump", "disp", "decal", "refl"].contains(&keyword);
+    let is_named = NAMES.contains(&keyword) || keyword.starts_with("map_") || TEXTURES.contains(&keyword);
     match is_named {
         true => line.find("# "),
         false => line.find('#'),
@@ -136,7 +138,8 @@ struct ObjReader {
     materials: Vec<Material>,
     by_name: HashMap<String, usize>,
     pictures: Vec<ObjPicture>,
-    libraries: Vec<PathBuf>,
+    /// Libraries, and all textures that they name, read or not.
+    files: Vec<PathBuf>,
     warnings: Vec<String>,
     /// A material library is missing; this warning explains unknown material names, too.
     library_missing: bool,
@@ -283,7 +286,7 @@ impl ObjReader {
         } else {
             names.split_whitespace().map(|name| self.folder.join(clean(name))).collect()
         };
-        self.libraries.extend_from_slice(&paths);
+        self.files.extend_from_slice(&paths);
         for path in paths {
             match fs::read(&path) {
                 Ok(bytes) => self
@@ -310,6 +313,9 @@ impl ObjReader {
                     self.add_material(name, &mtl);
                 }
             } else if let Some((_, mtl)) = &mut current {
+                if keyword.starts_with("map_") || TEXTURES.contains(&keyword) {
+                    self.files.extend(Map::parse(rest).ok().map(|map| self.folder.join(map.path)));
+                }
                 mtl.set(keyword, rest).with_context(|| format!("line {number}"))?;
             }
         }
@@ -370,11 +376,9 @@ impl ObjReader {
         }
         let groups = std::mem::take(&mut self.groups);
         let unread = self.prune_unused(options.prune, &groups);
-        let pictures = self.pictures.iter().flat_map(|picture| [&picture.color, &picture.alpha]).flatten();
-        let files = self.libraries.iter().chain(pictures).cloned().collect();
         let images = self.decode(options.missing)?;
         let built: Vec<(Mesh, Vec<Stroke>, Vec<String>)> = groups.into_par_iter().map(|g| self.build(g)).collect();
-        let mut scene = Scene { images, files, unread, warnings: self.warnings, ..Scene::default() };
+        let mut scene = Scene { images, files: self.files, unread, warnings: self.warnings, ..Scene::default() };
         let mut strokes = Vec::new();
         for (mesh, lines, warnings) in built {
             scene.warnings.extend(warnings);

@@ -653,10 +653,10 @@ impl Device {
         largest as usize + 1
     }
 
-    /// Largest size of a storage buffer binding in bytes.
+    /// Largest size in bytes of a storage buffer that is bound whole.
     #[must_use]
     pub fn max_storage_bytes(&self) -> u64 {
-        u64::from(self.limits.max_storage_buffer_range)
+        u64::from(self.limits.max_storage_buffer_range).min(self.offers.max_buffer_bytes)
     }
 
     /// Size of the largest memory heap that is local to the device, in bytes.

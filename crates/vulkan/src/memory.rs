@@ -102,7 +102,8 @@ impl Buffer {
     /// shader reads, and is named [`NOTHING`].
     ///
     /// # Errors
-    /// When a shader cannot bind so much of the device's own memory, or memory is short.
+    /// When it is larger than the device's buffers may be, when a shader cannot bind so much of the device's own
+    /// memory, or when memory is short.
     pub fn new(device: &Arc<Device>, name: &str, bytes: u64, place: Place) -> Result<Self> {
         Self::create(device, name, bytes, place, None)
     }
@@ -110,7 +111,7 @@ impl Buffer {
     /// A buffer that shaders also read as texels of `format` (`imageBuffer`).
     ///
     /// # Errors
-    /// When it has more texels than the device allows, or memory is short.
+    /// As [`Buffer::new`], and when it has more texels than the device allows.
     pub fn texels(device: &Arc<Device>, name: &str, bytes: u64, place: Place, format: vk::Format) -> Result<Self> {
         Self::create(device, name, bytes, place, Some(format))
     }
