@@ -6,7 +6,8 @@ use std::f64::consts::PI;
 
 use etalon::frame::{Background, Renderer, Settings};
 use etalon::image::Picture;
-use etalon::optics::SplitMix64;
+use etalon::optics::fresnel::fresnel_dielectric;
+use etalon::optics::{SplitMix64, brdf};
 use etalon::plan::{Knobs, Model};
 use etalon::scene::environment::{self, Environment};
 use etalon::scene::{LightKind, Material, Scene};
@@ -206,7 +207,9 @@ fn light_adds_up_in_any_order() {
 
 /// The film against all lights in f64, at the points, normals and materials that the G-buffer holds.
 fn against_all_lights(gpu: &Gpu, scene: &Scene, orthographic: bool, size: [u32; 2]) -> f64 {
-    let (film, aovs, view) = gpu.all(scene, &scene.cameras[0], settings(size));
+    let mut settings = settings(size);
+    settings.knobs.set("brdf=ggx").expect("a rung");
+    let (film, aovs, view) = gpu.all(scene, &scene.cameras[0], settings);
     let mut error = 0.0_f64;
     let (mut lit, mut brightest) = (0, 0.0_f64);
     let mut wants = Vec::new();
@@ -651,8 +654,8 @@ fn a_blurred_background_is_the_environment_through_a_lobe() {
             }
             eprintln!("{model:?}, alpha {alpha}: {worst} of {brightest}, {behind} behind, {covered} covered");
             assert!(behind > 100 && covered > 20 && brightest > 1.0, "{model:?}: {behind} {covered} {brightest}");
-            // As for the metal below.
-            assert!(worst < 0.05 * brightest, "{model:?}, alpha {alpha}: {worst} of {brightest}");
+            // Of a level 128 to 4096 directions are looked up for a texel, and those of a level are interpolated.
+            assert!(worst < 0.03 * brightest, "{model:?}, alpha {alpha}: {worst} of {brightest}");
         }
         // Glass of index 1 is not seen.
         let (through, _) = shot(&glass, Background::Environment, 0.5);
@@ -672,12 +675,33 @@ fn a_blurred_background_is_the_environment_through_a_lobe() {
     }
 }
 
+/// Returns the first channel of a map through the GGX lobe of a white metal about +Z, seen from the unit direction v:
+/// ∫ L f cosθ dω over the same integral with L = 1.
+fn through_lobe_of_metal(map: &Environment, v: DVec3, alpha: f64) -> f64 {
+    let (width, height) = (f64::from(map.width), f64::from(map.height));
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for (i, radiance) in map.radiance.iter().enumerate() {
+        let (x, y) = (i as u32 % map.width, i as u32 / map.width);
+        let l = environment::direction((f64::from(x) + 0.5) / width, (f64::from(y) + 0.5) / height);
+        if l.z > 0.0 {
+            let [.., reflected] = brdf::ggx(DVec3::Z, l, v, alpha, 1.0);
+            let weight = reflected * (1.0 - l.y * l.y).sqrt();
+            sum += weight * f64::from(radiance[0]);
+            whole += weight;
+        }
+    }
+    sum / whole
+}
+
+/// The lobe of the prefiltered map whose mean is that of the metal's lobe, beside the exact integral and the lobe about
+/// the direction of reflection (docs/decisions/split-sum.md). A narrow lobe about a lamp keeps an error: it is longer
+/// than wide.
 #[test]
 fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
     let gpu = Gpu::open();
     let room = room();
     let white = Environment { radiance: vec![[1.0; 3]; 256 * 128], ..room.clone() };
-    for alpha in [0.125_f64, 0.25, 0.5] {
+    for (alpha, near) in [(0.125_f64, 0.95), (0.25, 0.85), (0.5, 0.55), (1.0, 0.1)] {
         let roughness = alpha.sqrt() as f32;
         let metal = Material { base_color: [1.0; 4], metallic: 1.0, roughness, ..Material::default() };
         let mut made = Made::new("metal wall");
@@ -686,22 +710,24 @@ fn a_rough_metal_mirrors_the_lobe_of_what_is_around() {
         let shot = |environment| gpu.shot(&made.0, Some(environment), settings(SIZE)).1;
         let (of_room, of_white) = (shot(&room), shot(&white));
         let tan = 35_f64.to_radians().tan();
-        let (mut worst, mut brightest) = (0.0_f64, 0.0_f64);
+        let (mut error, mut without, mut brightest, mut pixels) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0);
         for i in (0..of_room.rgba.len()).step_by(7) {
             let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
             let across = (f64::from(x) + 0.5) / f64::from(SIZE[0]) * 2.0 - 1.0;
             let down = (f64::from(y) + 0.5) / f64::from(SIZE[1]) * 2.0 - 1.0;
             let aspect = f64::from(SIZE[0]) / f64::from(SIZE[1]);
-            let n = DVec3::new(across * tan * aspect, -down * tan, 1.0).normalize();
-            let want = through_lobe(&room, n, alpha);
+            let r = DVec3::new(across * tan * aspect, -down * tan, 1.0).normalize();
+            let want = through_lobe_of_metal(&room, DVec3::new(-r.x, -r.y, r.z), alpha);
             assert!(of_white.rgba[i][0] > 0.0, "pixel {i} mirrors nothing");
             let found = f64::from(of_room.rgba[i][0]) / f64::from(of_white.rgba[i][0]);
-            worst = worst.max((found - want).abs());
+            error += (found - want).powi(2);
+            without += (through_lobe(&room, r, alpha) - want).powi(2);
             brightest = brightest.max(want);
+            pixels += 1.0;
         }
-        eprintln!("alpha {alpha}: {worst} of {brightest}");
-        // A sample stands for a texel of a box-filtered level, and those of a level are interpolated.
-        assert!(worst < 0.05 * brightest, "alpha {alpha}: {worst} of {brightest}");
+        let [error, without] = [error, without].map(|sum| (sum / pixels).sqrt() / brightest);
+        eprintln!("alpha {alpha}: {error} of the brightest, {without} about the direction of reflection");
+        assert!(error < near * without, "alpha {alpha}: {error} {without}");
     }
 }
 
@@ -715,6 +741,54 @@ fn light_through_both_sides_of_a_sheet() {
     made.light([50.0; 3], LightKind::Directional { direction: DVec3::Z });
     let film = gpu.film(&made.0, settings(SIZE));
     assert!(film.rgba.iter().all(|p| (p[0] - 1.0).abs() < 1e-6), "{:?}", film.rgba[0]);
+}
+
+/// A lamp behind frosted glass: its lobe is that of the mirrored lamp before a white metal, times what enters and the
+/// colour of the glass. Smooth glass shows no lamp that has no size.
+#[test]
+fn lamps_shine_through_rough_thin_walls() {
+    let gpu = Gpu::open();
+    let (base, lamp) = ([0.8_f32, 0.5, 0.25], DVec3::new(0.4, -0.2, -1.5));
+    for model in [Model::Local, Model::Recursive, Model::Global] {
+        for roughness in [0.4_f32, 0.8, 0.0] {
+            let mut made = Made::new("frosted glass");
+            let [r, g, b] = base;
+            let color = [r, g, b, 1.0];
+            let glass =
+                Material { base_color: color, metallic: 0.0, transmission: 1.0, roughness, ..Material::default() };
+            made.add(Shape::panel(8.0, 4.0), glass, DAffine3::IDENTITY);
+            made.front(1.0);
+            made.light([3.0; 3], LightKind::Point { position: lamp, range: None });
+            let mut settings = Settings { knobs: Knobs::of(model), ..settings(SIZE) };
+            for choice in ["samples=1", "fresnel=exact", "brdf=ggx"] {
+                settings.knobs.set(choice).expect("a rung");
+            }
+            let film = gpu.film(&made.0, settings);
+            if roughness == 0.0 {
+                assert!(film.rgba.iter().all(|p| p[..3] == [0.0; 3]), "{model:?}: {:?}", film.rgba[0]);
+                continue;
+            }
+            let alpha = f64::from(roughness).powi(2);
+            let expected = |i: usize| {
+                let to_lamp = lamp - on_wall(i, SIZE);
+                let l = to_lamp.normalize();
+                let mirrored = DVec3::new(l.x, l.y, -l.z);
+                let white = brdf::ggx(DVec3::Z, mirrored, DVec3::Z, alpha, 1.0)[4];
+                let enters = 1.0 - fresnel_dielectric((mirrored + DVec3::Z).normalize().z, 1.5)[0];
+                DVec3::from(base.map(f64::from)) * (3.0 * white * enters / to_lamp.length_squared())
+            };
+            if model == Model::Global {
+                // Paths begin anywhere in a pixel: their mean counts.
+                let found: f64 = film.rgba.iter().map(|p| f64::from(p[0])).sum();
+                let want: f64 = (0..film.rgba.len()).map(|i| expected(i).x).sum();
+                assert!((found - want).abs() < 5e-3 * want, "roughness {roughness}: {found} {want}");
+                continue;
+            }
+            let error = worst(&film, 0.01, expected);
+            eprintln!("{model:?}, roughness {roughness}: {error:e}");
+            assert!(error < 1e-5, "{model:?}, roughness {roughness}: {error:e}");
+        }
+    }
 }
 
 #[test]

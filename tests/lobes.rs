@@ -70,7 +70,7 @@ fn albedo(alpha: f64) -> f64 {
 
 fn settings(choices: &[&str]) -> Settings {
     let mut settings = Settings { size: [32, 24], ..Settings::default() };
-    for choice in ["samples=256"].iter().chain(choices) {
+    for choice in ["samples=256", "brdf=ggx"].iter().chain(choices) {
         settings.knobs.set(choice).expect("a rung");
     }
     settings
@@ -154,7 +154,7 @@ fn rougher_lobes_are_left_to_the_environment() {
 }
 
 /// The table of directional reflectance at its edge: the roughest metal in a white furnace, without rays. The table's
-/// sum is good to 4e-3 (src/upload/environment.rs).
+/// sum is good to 4e-3 (src/upload/split_sum.rs).
 #[test]
 fn the_roughest_metal_loses_in_a_furnace_what_the_integral_says() {
     let gpu = Gpu::open();

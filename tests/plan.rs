@@ -334,7 +334,7 @@ const OF_OCCLUSION: &[&[&str]] = &[
         "work counts for the host",
     ],
     &["G-buffer triangles"],
-    &["environment", "background.sky", "directional reflectance"],
+    &["environment", "background.sky"],
     &["[ambient occlusion]", "ambient", "sky directions"],
 ];
 
@@ -490,6 +490,14 @@ fn lights_are_there_where_something_is_lit() {
             "shadow_map",
         ]],
         ..Case::new("shadows", reason, without, with)
+    }
+    .check();
+    let sheet = |roughness| Material { thickness: 0.0, roughness, ..glass() };
+    let (without, with) = ([0.0, 0.1]).map(|roughness| lit(ball(chalk(), Some(sheet(roughness))), 1)).into();
+    Case {
+        environments: dark(),
+        brings: &[&["interact.rough", "interact.rough_transmission", "light.rough_transmission"]],
+        ..Case::new("rough transmission", NONE, without, with)
     }
     .check();
     let veil = Material { base_color: [1.0, 1.0, 1.0, 0.5], alpha_mode: AlphaMode::Blend, ..chalk() };

@@ -103,6 +103,7 @@ Layers passing_layers_at(HitSurface hit, Boundary boundary) {
         b.tint = tint_through(hit.s.base, boundary.sheet, hit.front, hit.sigma_thickness * hit.thickness);
         b.transmits = hit.transmits * (1.0 - hit.s.metallic);
     }
+    b.from_behind = false;
     b.shares = vec4(0.0);
     return b;
 }

@@ -9,8 +9,6 @@
 #include "lib/path_guiding.glsl"
 #include "lib/boundary.glsl"
 
-layout(constant) const bool ROUGH_TRANSMISSION = false; // some transmissive surface is rough
-
 struct Bsdf {
     Layers layers;
     vec3 n;       // normal of the triangle, on the viewer's side

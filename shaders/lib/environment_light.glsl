@@ -46,10 +46,15 @@ vec3 diffuse_environment_light(EnvironmentFactors f, vec3 irradiance) {
 // Narrow lobes that make up an anisotropic one.
 const uint LOBE_PARTS = 16;
 
+vec3 radiance_in_round_base_lobe(Surface s) {
+    RoundLobe lobe = round_lobe(s.n, s.v, s.roughness, s.alpha, vec2(mean(s.f0), s.f90) * s.lobe);
+    return prefiltered_radiance(lobe.direction, lobe.alpha);
+}
+
 // The radiance of the environment in the lobe of the base. An anisotropic lobe is the sum of round ones, of the α across it,
 // around half vectors spread along its wide direction: variances add, so these have α² = α_t² − α_b² along and 0 across.
 vec3 radiance_in_base_lobe(Surface s) {
-    vec3 result = prefiltered_radiance(reflect_ray(-s.v, s.n).R, s.alpha);
+    vec3 result = radiance_in_round_base_lobe(s);
     if (ANISOTROPY) {
         if (is_anisotropic(s)) {
             vec2 alphas = vec2(sqrt(max(s.alpha_along * s.alpha_along - s.alpha * s.alpha, 0.0)), SMALLEST_ALPHA);
@@ -69,10 +74,12 @@ vec3 radiance_in_base_lobe(Surface s) {
 }
 
 vec3 radiance_in_coat_lobe(Surface s) {
-    return prefiltered_radiance(reflect_ray(-s.v, s.n_coat).R, s.clearcoat_alpha);
+    vec2 parts = vec2(COAT_F0, 1.0) * reflectance_of_lobe(dot(s.n_coat, s.v), s.clearcoat_roughness);
+    RoundLobe lobe = round_lobe(s.n_coat, s.v, s.clearcoat_roughness, s.clearcoat_alpha, parts);
+    return prefiltered_radiance(lobe.direction, lobe.alpha);
 }
 
-// Without visibility: the irradiance, and the prefiltered map in the direction of reflection.
+// Without visibility: the irradiance, and the prefiltered map in the mean directions of the lobes.
 vec3 environment_light(Surface s, LayerAlbedo albedo) {
     EnvironmentFactors factors = environment_factors(s, albedo);
     vec3 result = diffuse_environment_light(factors, AMBIENT ? environment_irradiance(s.n) : vec3(0.0));

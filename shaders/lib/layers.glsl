@@ -24,6 +24,7 @@
 #include "lib/thin_film.glsl"
 
 layout(constant) const bool TRANSMISSIVE = false; // some material transmits light
+layout(constant) const bool ROUGH_TRANSMISSION = false; // lobes of rough surfaces that transmit light are evaluated
 
 // --------------------------------------------------------------------------------------------------------------------
 // Fresnel reflectance of each layer
@@ -297,6 +298,7 @@ struct Layers {
     float through_share; // fraction of the diffuse light that diffuse transmission sends to the other side
     vec3 tint;         // colour of transmitted light
     float transmits;   // fraction of the entering light that is transmitted
+    bool from_behind;  // light comes through this rough thin-walled surface: evaluate_reflection takes its mirrored direction
     vec4 shares;       // selection probabilities of coat, base, diffuse base layer, transmission for paths; their sum is 1, or 0
 };
 
@@ -373,8 +375,8 @@ LayerAlbedo layer_albedo(Surface s, BaseAlbedo base) {
     return r;
 }
 
-// The layers of an opaque surface whose base is a rough lobe for every roughness: for lighting by punctual lights and by
-// the prefiltered environment.
+// The layers of a surface whose base is a rough lobe for every roughness: for lighting by punctual lights and by the
+// prefiltered environment.
 Layers layers_of(Surface s, LayerAlbedo albedo) {
     Layers b;
     b.s = s;
@@ -395,6 +397,7 @@ Layers layers_of(Surface s, LayerAlbedo albedo) {
     b.through_share = diffuse_through_share(s);
     b.tint = vec3(0.0);
     b.transmits = 0.0;
+    b.from_behind = false;
     b.shares = vec4(0.0);
     return b;
 }
@@ -443,6 +446,28 @@ BaseLobe base_lobe(Layers b, vec3 l, float cos_l, HalfAngle h) {
     return r;
 }
 
+// What a thin-walled surface transmits of the light that enters it, where it is rough: a light behind it is seen through it.
+// 0 of smooth surfaces, through which no ray meets a punctual light, and of others.
+vec3 passes_roughly(Surface s, bool sheet, vec3 tint, float transmits) {
+    bool rough = s.roughness > MIN_ROUGHNESS || is_anisotropic(s);
+    return ROUGH_TRANSMISSION && sheet && rough ? tint * (transmits * (1.0 - s.metallic)) : vec3(0.0);
+}
+
+// For light from behind a rough thin-walled surface, which scatters as its mirror image does to the other side: what reflects
+// light sends nothing.
+Layers seen_through(Layers b) {
+    b.from_behind = true;
+    b.s.diffuse = vec3(0.0);
+    b.s.sheen.rgb = vec3(0.0);
+    return b;
+}
+
+// Phong's lobes have no transmission.
+bool passes_light_from(Surface s, vec3 l) {
+    const bool phong = BRDF == BRDF_BLINN_PHONG || BRDF == BRDF_BLINN_PHONG_RECIPROCAL;
+    return ROUGH_TRANSMISSION && !phong && largest(s.passes) > 0.0 && dot(s.n, l) < 0.0;
+}
+
 // --------------------------------------------------------------------------------------------------------------------
 // Evaluate
 
@@ -484,7 +509,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
                 // counts, so that a tinted F0 gives no complementary colour (KHR_materials_specular).
                 FacetFresnel f = fresnel_below_coat(b, h.cos_d);
                 if (BRDF == BRDF_GGX) enters = 1.0 - largest(f.dielectric);
-                lobe = f.base * s.compensation * base.value;
+                lobe = b.from_behind ? s.passes * ((1.0 - largest(f.dielectric)) * base.value) : f.base * s.compensation * base.value;
             }
             r.pdf += b.shares.y * base.pdf;
         }
@@ -505,7 +530,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
             float d = ggx_distribution(h.cos_h, h.sin2_h, s.clearcoat_alpha);
             float vis = ggx_visibility(coat_l, coat_v, s.clearcoat_alpha);
             // Selected, not multiplied by 0: the textbook form of `vis` is NaN at the horizon.
-            float lobe = coat_l > 0.0 ? d * vis * coat_l : 0.0;
+            float lobe = coat_l > 0.0 && !b.from_behind ? d * vis * coat_l : 0.0;
             r.f_cos = r.f_cos * (BRDF == BRDF_GGX_MULTI ? b.under : 1.0 - f) + f * lobe;
             r.pdf += coat_l > 0.0 ? b.shares.x * mirrored_pdf(coat_v, h, s.clearcoat_alpha) : 0.0;
         }

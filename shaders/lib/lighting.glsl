@@ -58,6 +58,8 @@ Layers without_mirrors(Layers b, uint surface) {
         b.s.f0 = vec3(0.0);
         b.s.compensation = vec3(0.0);
     }
+    // What emits is found by the ray that goes on.
+    b.s.passes = vec3(0.0);
     if (CLEARCOAT && (b.s.coat_traced || (on_screen && b.s.clearcoat_roughness <= ROUGHEST_MIRROR))) {
         b.coat_delta = true;
         b.under = BRDF == BRDF_GGX_MULTI ? b.under : under_coat(b.s);
@@ -95,18 +97,23 @@ vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, ui
         sky = sky_ray(s, is_sky ? index : 0u);
         if (is_sky) light = PunctualLight(sky.sky.direction, sky.sky.direction, vec3(0.0), true);
     }
-    vec3 result = evaluate_reflection(b, light.l).f_cos * light.arriving;
+    bool from_behind = passes_light_from(b.s, light.l);
+    if (from_behind) b = seen_through(b);
+    vec3 result = evaluate_reflection(b, from_behind ? reflect(light.l, s.n) : light.l).f_cos * light.arriving;
     if (DIFFUSE_TRANSMISSION) {
-        // Light from behind: seen from there, the surface is turned over.
         vec3 through = evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
         if (largest(through) > 0.0) {
-            vec3 front = ray_origin(s.p_bvh, s.n_triangle, s.v);
-            result = through;
-            s.n = -s.n;
-            s.n_triangle = -s.n_triangle;
-            s.v = reflect(s.v, s.n);
-            if (LIGHT_SAMPLES > 0 && is_sample) light.to_light += front - ray_origin(s.p_bvh, s.n_triangle, s.v);
+            result = from_behind ? result + through : through;
+            from_behind = true;
         }
+    }
+    if ((DIFFUSE_TRANSMISSION || ROUGH_TRANSMISSION) && from_behind) {
+        // Seen from the light, the surface is turned over.
+        vec3 front = ray_origin(s.p_bvh, s.n_triangle, s.v);
+        s.n = -s.n;
+        s.n_triangle = -s.n_triangle;
+        s.v = reflect(s.v, s.n);
+        if (LIGHT_SAMPLES > 0 && is_sample) light.to_light += front - ray_origin(s.p_bvh, s.n_triangle, s.v);
     }
     if (SKY_RAYS > 0 && is_sky) {
         s.v = free_side(s, sky);

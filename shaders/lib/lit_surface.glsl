@@ -14,6 +14,7 @@ LitSurface lit_surface(ivec2 pixel) {
     Primary primary = primary_surface(pixel, false);
     LitSurface r = LitSurface(primary.drawn, false, primary.hit.s);
     keep_diffuse(r.s, 1.0 - primary.hit.transmits);
+    r.s.passes = passes_roughly(primary.hit);
     if (IN_MEDIUM && primary.hit.transmission > 0.0 && !primary.hit.sheet) {
         // As in lib/ray_tree.glsl: inside a solid reflections are traced by rays, and an interface suppressed by priority does
         // nothing.

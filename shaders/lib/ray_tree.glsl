@@ -134,6 +134,7 @@ Surface surface_for_lights(HitSurface hit, Boundary boundary, uint leaf) {
     if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.medium_in));
     compensate(s);
     keep_diffuse(s, 1.0 - hit.transmits);
+    s.passes = passes_roughly(hit);
     // Single-sided surfaces emit on their front alone, as for light samples.
     if (!hit.front && (hit_material(leaf) & ONE_SIDED_TRIANGLE) != 0) s.emissive = vec3(0.0);
     // Light traced by a ray is not looked up as well.

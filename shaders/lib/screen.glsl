@@ -95,12 +95,11 @@ int met_on_screen(vec3 p_rel, vec3 direction) {
 }
 
 // The change of radiance where the reflected ray hits the picture: radiance of the hit pixel instead of the environment's.
-vec3 screen_instead(Surface s, vec3 n, float alpha, vec3 share) {
+vec3 screen_instead(Surface s, vec3 n, vec3 environment, vec3 share) {
     vec3 r = reflect_ray(-s.v, n).R;
     bool looks = largest(share) > 0.0 && dot(r, s.n_triangle) > 0.0;
     int met = looks ? met_on_screen(s.p_rel, r) : -1;
-    vec3 before = REFLECTION ? prefiltered_radiance(r, alpha) : vec3(0.0);
-    return met >= 0 ? share * (seen[met].rgb - before) : vec3(0.0);
+    return met >= 0 ? share * (seen[met].rgb - environment) : vec3(0.0);
 }
 
 // Correction of `environment_light` for smooth surfaces whose reflected rays hit the picture.
@@ -111,10 +110,10 @@ vec3 mirrored_on_screen(Surface s, bool wanted) {
     BaseAlbedo albedo = albedo_of_base(s);
     // The weight with which lib/environment_light.glsl has added the environment.
     float by_base = is_round && s.roughness <= ROUGHEST_MIRROR ? layer_albedo(s, albedo).under_coat * shown : 0.0;
-    vec3 result = screen_instead(s, s.n, s.alpha, albedo.base * by_base);
+    vec3 result = screen_instead(s, s.n, REFLECTION ? radiance_in_round_base_lobe(s) : vec3(0.0), albedo.base * by_base);
     if (CLEARCOAT) {
         float by_coat = s.clearcoat_roughness <= ROUGHEST_MIRROR ? albedo_of_coat(s) * shown : 0.0;
-        result += screen_instead(s, s.n_coat, s.clearcoat_alpha, vec3(by_coat));
+        result += screen_instead(s, s.n_coat, REFLECTION ? radiance_in_coat_lobe(s) : vec3(0.0), vec3(by_coat));
     }
     return result;
 }

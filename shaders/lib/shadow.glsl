@@ -56,6 +56,12 @@ vec3 tint_through(vec3 base, bool sheet, bool front, vec3 nominal_depth) {
     return tint;
 }
 
+// What lights shine through, at the end of a ray or in the G-buffer.
+vec3 passes_roughly(HitSurface hit) {
+    vec3 tint = ROUGH_TRANSMISSION ? tint_through(hit.s.base, true, hit.front, hit.sigma_thickness * hit.thickness) : vec3(0.0);
+    return passes_roughly(hit.s, hit.sheet, tint, hit.transmits);
+}
+
 // Transmittance of one surface for light along `direction`; updates the list of media. Where the light is that of the whole
 // environment, `ambient`, what the interfaces reflect counts as passing: as much of it arrives from the other side, so that
 // in uniform light a body without colour and absorption hides nothing.

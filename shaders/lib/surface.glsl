@@ -41,6 +41,7 @@ struct Surface {
     vec3 v;              // unit vector to the viewer
     vec3 diffuse;        // albedo of the diffuse base layer
     vec3 diffuse_through; // albedo of diffuse transmission
+    vec3 passes;         // share of the light that enters a rough thin-walled surface which leaves on the other side (lib/layers.glsl)
     float metallic;
     vec3 f0_dielectric;
     float f90_dielectric;
@@ -115,6 +116,7 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
     float metal = t.metallic * m.metallic;
     s.diffuse = s.base * (1.0 - metal);
     s.diffuse_through = vec3(0.0);
+    s.passes = vec3(0.0);
     if (DIFFUSE_TRANSMISSION) {
         vec4 factors = lobe_factors(id, LOBE_DIFFUSE_TRANSMISSION);
         float through = factors.x * t.diffuse_transmission.a;

@@ -117,6 +117,7 @@ void main() {
         vec3 reflected = fresnel_of_base(s, clamp(dot(s.n, s.v), 0.0, 1.0)).dielectric;
         vec3 passes = straight_transmittance(tint, transmission * (1.0 - s.metallic), reflected, under_coat(s), left_to_base(s));
         keep_diffuse(s, 1.0 - transmission);
+        s.passes = passes_roughly(s, (instances[nodes[at + 2]].flags & INSTANCE_SHEET) != 0, tint, transmission);
         // 5. Lighting of the fragment.
         float alpha = blue_alpha.y;
         compensate(s);

@@ -70,6 +70,7 @@ impl Plan {
         let photons = planner.caustics(followed, &lights);
         let paths = planner.paths.then_some(Paths { guided, photons });
         let rays = planner.rays(&transmission, &images, &lights, samples);
+        let rough_transmission = planner.rough_transmission(&lights, samples);
         let (bands, disperses) = planner.wavelengths(&transmission);
         let from_points = lights.directional + lights.local > 0 && paths.is_none();
         let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && from_points;
@@ -104,6 +105,7 @@ impl Plan {
             shadow_maps,
             lights: lights.kept,
             rays,
+            rough_transmission,
             light_samples: samples,
             paths,
             screen: images.screen,
@@ -504,6 +506,18 @@ impl Planner<'_> {
         (if spectral { bands } else { 0 }, disperses && spectral)
     }
 
+    /// Lobes of rough transmission that are evaluated: for all light of paths, and in other models for lights behind
+    /// thin-walled surfaces.
+    fn rough_transmission(&mut self, lights: &Lights, samples: LightSamples) -> bool {
+        let Self { surfaces, decisions, paths, .. } = self;
+        let transmits = |m: &Material| m.transmission > 0.0 && wider(m, SMOOTHEST) && (*paths || surfaces.is_sheet(m));
+        let cause = match *paths || lights.directional + lights.local > 0 || samples.shaped {
+            true => surfaces.cause(transmits, |m| format!("transmits light with roughness {}", m.roughness)),
+            false => Cause::against("no light shines through surfaces"),
+        };
+        decisions.decide(EffectId::RoughTransmission, cause)
+    }
+
     /// The kinds of rays, and the shader code for the surfaces that they can hit.
     fn rays(
         &mut self,
@@ -536,8 +550,6 @@ impl Planner<'_> {
         let filters = decisions.decide(EffectId::TransparentShadows, cause);
         let cause = surfaces.cause(|m| m.transmission > 0.0, |m| format!("has transmission {}", m.transmission));
         let transmissive = decisions.decide(EffectId::TransmissiveHits, cause);
-        // An anisotropic lobe is wide along its direction, however smooth the material is across it.
-        let wider = |m: &Material, bound: f32| m.roughness > bound || m.has_direction();
         let immersed = surfaces.any(immerses);
         let rough = |m: &Material| {
             let coat = m.clearcoat > 0.0 && m.clearcoat_roughness > 0.0;
@@ -553,12 +565,6 @@ impl Planner<'_> {
             EffectId::GlossyReflection,
             surfaces.cause(rough, |m| format!("scatters rays at roughness {}", m.roughness)),
         );
-        let rough_transmission = |m: &Material| m.transmission > 0.0 && wider(m, SMOOTHEST);
-        let cause = match *paths {
-            true => surfaces.cause(rough_transmission, |m| format!("transmits light with roughness {}", m.roughness)),
-            false => Cause::against("path tracing is off"),
-        };
-        let rough_transmission = decisions.decide(EffectId::RoughTransmission, cause);
         let absorbs = |m: &Material| m.absorbs() && m.transmission > 0.0 && m.thickness > 0.0;
         let absorption = decisions.decide_with(
             EffectId::Absorption,
@@ -577,7 +583,6 @@ impl Planner<'_> {
             masked,
             filters,
             rough,
-            rough_transmission,
             attenuation: match knobs.absorption {
                 Absorption::Thickness if absorption => Attenuation::Nominal,
                 _ if absorption => Attenuation::Path,
@@ -588,6 +593,12 @@ impl Planner<'_> {
             textures: surroundings.forced == ForcedEffects::All,
         })
     }
+}
+
+/// Whether a surface's lobe is wider than that of a roughness. An anisotropic lobe is wide along its direction, however
+/// smooth the material is across it.
+fn wider(m: &Material, bound: f32) -> bool {
+    m.roughness > bound || m.has_direction()
 }
 
 /// The verdict on effects that path tracing replaces.

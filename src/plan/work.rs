@@ -57,6 +57,8 @@ pub struct Plan {
     pub shadow_maps: bool,
     /// Ray tracing with the BVH; `None` when no pass sends rays.
     pub rays: Option<Rays>,
+    /// Lobes of rough surfaces that transmit light are evaluated (rough BTDF).
+    pub rough_transmission: bool,
     /// Lights that are sampled: those with an extent in every model, and all of them in path tracing.
     pub light_samples: LightSamples,
     /// Path tracing, which replaces all other passes that light surfaces. `None`: direct light from lights,
@@ -105,8 +107,6 @@ pub struct Rays {
     pub filters: bool,
     /// Some surface that sends rays is rough: rays sample its lobe (glossy reflection).
     pub rough: bool,
-    /// Some transmissive surface of a path is rough (rough BTDF).
-    pub rough_transmission: bool,
     /// Absorption of media.
     pub attenuation: Attenuation,
     /// Marching of heterogeneous media.

@@ -12,6 +12,7 @@ pub mod scene;
 pub mod shared;
 pub mod sigma_grid;
 pub mod spectrum;
+pub mod split_sum;
 pub mod table;
 pub mod texture;
 pub mod view;

@@ -103,7 +103,6 @@ impl<'a> OnDevice<'a> {
             arithmetic: lib::arithmetic::Constants { arithmetic: knobs.arithmetic as u32 },
             path_guiding: lib::path_guiding::Constants { path_guiding: paths.guided },
             boundary: lib::boundary::Constants { coincident_interfaces: rays.constants.touching },
-            bsdf: lib::bsdf::Constants { rough_transmission: with.rough_transmission },
             emitters: lib::emitters::Constants {
                 emitters: emitters.count,
                 emitter_search_steps: binary_search_steps(emitters.count),
@@ -147,7 +146,10 @@ impl<'a> OnDevice<'a> {
             hit: rays.constants.hit,
             own_tiles: lib::own_tiles::Constants::default(),
             normals: lib::normals::Constants { normals: plan.stored.normals as u32 },
-            layers: lib::layers::Constants { transmissive: with.transmissive },
+            layers: lib::layers::Constants {
+                transmissive: with.transmissive,
+                rough_transmission: plan.rough_transmission,
+            },
             lighting: lib::lighting::Constants {
                 // With tiled light culling no pixel loops over all local lights.
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },

@@ -5,8 +5,8 @@ use std::path::Path;
 
 /// The largest stage, `path.comp`, has 227 thousand; with each call written out it had 418.
 const LARGEST: usize = 240_000;
-/// All together have 1,507 thousand; they had 2,508.
-const TOGETHER: usize = 1_510_000;
+/// All together have 1,510 thousand; they had 2,508.
+const TOGETHER: usize = 1_511_000;
 
 #[test]
 fn formulas_stand_once_in_a_kernel() {

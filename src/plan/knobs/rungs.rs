@@ -73,7 +73,7 @@ effects! {
     GlossyReflection = "glossy reflection":
         "a rough surface within the rung of `lobes`" => "code",
     RoughTransmission = "rough transmission":
-        "a rough transmissive surface, with path tracing" => "code",
+        "a rough transmissive surface, with path tracing; a rough thin-walled one with punctual or area lights" => "code",
     Absorption = "absorption":
         "a solid that absorbs" => "code",
     CoincidentInterfaces = "coincident interfaces":
@@ -205,7 +205,7 @@ knob! {
         /// GGX with compensation for the light that facets reflect several times; it is not reciprocal.
         GgxMulti = "ggx-multi",
     }
-    presets: [Ggx, Ggx, GgxMulti],
+    presets: [GgxMulti, GgxMulti, GgxMulti],
     exact: GgxMulti,
     lecture: ["B1", "B5", "B6"],
     effects: [],

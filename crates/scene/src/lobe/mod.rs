@@ -64,7 +64,7 @@ pub struct Lobe {
 pub static LOBES: [&Lobe; COUNT] =
     [&sheen::SHEEN, &anisotropy::ANISOTROPY, &iridescence::IRIDESCENCE, &diffuse_transmission::DIFFUSE_TRANSMISSION];
 
-// The table of directional albedo has room for one lobe (src/upload/environment.rs).
+// The table of directional albedo has room for one lobe (src/upload/split_sum.rs).
 const _: () = {
     let (mut place, mut with_albedo) = (0, 0);
     while place < COUNT {
