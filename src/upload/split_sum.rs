@@ -1,5 +1,5 @@
-//! The tables of GGX lobes for the split-sum approximation, by the viewer's cosine and perceptual roughness: directional
-//! albedos, and the means of lobes (shaders/lib/reflectance.glsl).
+//! The tables of GGX lobes for the split-sum approximation, by the viewer's cosine and perceptual roughness:
+//! directional albedos, and the means of lobes (shaders/lib/reflectance.glsl).
 //!
 //! A lobe sees the environment as the lobe of the prefiltered map does whose mean direction is the same, and whose mean
 //! has the same length (docs/decisions/split-sum.md). Read Karis 2013, "Real Shading in Unreal Engine 4"; Heitz 2018,
@@ -23,8 +23,8 @@ const ALMOST_NORMAL: f64 = 0.999;
 /// The roughness for the first row of means: a lobe without width has no share of a width.
 const ALMOST_SMOOTH: f64 = 0.01;
 
-/// Both tables, one below the other, computed once per process. It has two forms: with the albedo of an extension's lobe
-/// in the last two channels of the first table, or without.
+/// Both tables, one below the other, computed once per process. It has two forms: with the albedo of an extension's
+/// lobe in the last two channels of the first table, or without.
 pub fn tables(lobes: u32) -> &'static [Texel] {
     static TABLES: [OnceLock<Vec<Texel>>; 2] = [const { OnceLock::new() }; 2];
     let side = SIDE as usize;
@@ -72,13 +72,13 @@ impl LobeSums {
     }
 }
 
-/// The parts of a white GGX lobe about +Z by F0 and by F90 of Schlick's curve, 1 − (1 − V·H)⁵ and (1 − V·H)⁵ of it, seen from
-/// (sinθ, 0, cosθ).
+/// The parts of a white GGX lobe about +Z by F0 and by F90 of Schlick's curve, 1 − (1 − V·H)⁵ and (1 − V·H)⁵ of it,
+/// seen from (sinθ, 0, cosθ).
 ///
 /// Importance sampling of the visible normals (VNDF, Heitz 2018): each sample's weight is G₂ / G₁(V), at most 1, so the
 /// sum never exceeds the received energy. 512 samples are accurate to 3e-3 in albedos, and to 6e-4 in the mean over the
-/// table's texels; with 128, white metals of roughness 0.5 reflected 1.002 of the received light. Sampling D alone needs
-/// 4096 for 4e-3.
+/// table's texels; with 128, white metals of roughness 0.5 reflected 1.002 of the received light. Sampling D alone
+/// needs 4096 for 4e-3.
 fn parts_of_lobe(cos_v: f64, roughness: f64) -> [LobeSums; 2] {
     let alpha = roughness * roughness;
     let a2 = alpha * alpha;
@@ -147,8 +147,8 @@ impl Widths {
     }
 }
 
-/// The lobe of the prefiltered map that stands for a part of a lobe: k and α'/α. Its direction is that of R + k (N − R), where R is
-/// the direction of reflection.
+/// The lobe of the prefiltered map that stands for a part of a lobe: k and α'/α. Its direction is that of
+/// R + k (N − R), where R is the direction of reflection.
 ///
 /// For R = (−sinθ, cosθ) and a mean direction of tangent T to the normal, sinθ (1 − k) = T (cosθ + k (1 − cosθ)).
 fn round_lobe(cos_v: f64, roughness: f64, part: LobeSums, widths: &Widths) -> [f64; 2] {
