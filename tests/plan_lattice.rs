@@ -661,7 +661,7 @@ fn any_two_effects_are_kept_together_and_apart() {
     assert!(missed.is_empty(), "never planned, or planned although impossible: {missed:#?}");
 }
 
-/// Effects of paths: kept nowhere without them.
+/// Effects of paths. Rough transmission is one of lamps behind thin surfaces too (tests/plan.rs, tests/light.rs).
 const OF_PATHS: [&str; 4] = ["path guiding", "caustics of punctual lights", "rough transmission", "path tracing"];
 
 /// Effects of more lights than are here: tests/light_samples.rs has them.

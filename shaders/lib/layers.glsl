@@ -462,10 +462,8 @@ Layers seen_through(Layers b) {
     return b;
 }
 
-// Phong's lobes have no transmission.
 bool passes_light_from(Surface s, vec3 l) {
-    const bool phong = BRDF == BRDF_BLINN_PHONG || BRDF == BRDF_BLINN_PHONG_RECIPROCAL;
-    return ROUGH_TRANSMISSION && !phong && largest(s.passes) > 0.0 && dot(s.n, l) < 0.0;
+    return ROUGH_TRANSMISSION && largest(s.passes) > 0.0 && dot(s.n, l) < 0.0;
 }
 
 // --------------------------------------------------------------------------------------------------------------------
@@ -491,9 +489,11 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         vec3 lobe_alone = vec3(0.0); // the part that is not
         HalfAngle h = half_angle(s.n, sum);
         if (!b.delta) {
-            if (phong) h = phong_half_angle(s.n, l, s.v, h);
+            // Transmission has no Phong lobe.
+            bool by_phong = phong && !b.from_behind;
+            if (by_phong) h = phong_half_angle(s.n, l, s.v, h);
             BaseLobe base = base_lobe(b, l, cos_l, h);
-            if (phong) {
+            if (by_phong) {
                 // k_s makes the albedo of B6's lobe at normal incidence F0 in the limit of a narrow lobe only (shininess →
                 // ∞). It is 0.31 F0 for a shininess of 0, 0.41 F0 for 1, 0.81 F0 for 10 and 0.98 F0 for 100 (numerics.md
                 // S13).

@@ -58,7 +58,7 @@ Layers without_mirrors(Layers b, uint surface) {
         b.s.f0 = vec3(0.0);
         b.s.compensation = vec3(0.0);
     }
-    // What emits is found by the ray that goes on.
+    // What emits is seen behind: by the ray that goes on, or clear, in the picture.
     b.s.passes = vec3(0.0);
     if (CLEARCOAT && (b.s.coat_traced || (on_screen && b.s.clearcoat_roughness <= ROUGHEST_MIRROR))) {
         b.coat_delta = true;
@@ -97,15 +97,15 @@ vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, ui
         sky = sky_ray(s, is_sky ? index : 0u);
         if (is_sky) light = PunctualLight(sky.sky.direction, sky.sky.direction, vec3(0.0), true);
     }
-    bool from_behind = passes_light_from(b.s, light.l);
+    vec3 through = vec3(0.0);
+    if (DIFFUSE_TRANSMISSION) through = evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
+    // Rays of ambient occlusion choose their side themselves.
+    bool from_behind = !(SKY_RAYS > 0 && is_sky) && passes_light_from(b.s, light.l);
     if (from_behind) b = seen_through(b);
     vec3 result = evaluate_reflection(b, from_behind ? reflect(light.l, s.n) : light.l).f_cos * light.arriving;
-    if (DIFFUSE_TRANSMISSION) {
-        vec3 through = evaluate_diffuse_transmission(b, light.l).f_cos * light.arriving;
-        if (largest(through) > 0.0) {
-            result = from_behind ? result + through : through;
-            from_behind = true;
-        }
+    if (DIFFUSE_TRANSMISSION && largest(through) > 0.0) {
+        result = from_behind ? result + through : through;
+        from_behind = true;
     }
     if ((DIFFUSE_TRANSMISSION || ROUGH_TRANSMISSION) && from_behind) {
         // Seen from the light, the surface is turned over.

@@ -24,7 +24,7 @@ pub(super) fn left_out(
     let clear = |m: &Material| straight(m) || (m.transmission > 0.0 && !by_rays);
     say(&straight, "transmits light without refraction: refraction is off, or the material is alpha-blended");
     let smoothed = |m: &Material| clear(m) && m.roughness > 0.1 && knobs.indirect != Indirect::Path;
-    say(&smoothed, "has a rough surface that transmits light; it is drawn smooth");
+    say(&smoothed, "has a rough surface that transmits light; what is behind it is drawn clear");
     let casts = |m: &Material| !shadow_maps || casts_in_maps(m);
     say(&|m| !casts(m), "casts no shadow: shadow maps (shadows=map) contain only opaque and masked surfaces");
     let (absorption, marches) = (knobs.absorption, by_rays && knobs.absorption.steps() > 0);

@@ -70,7 +70,7 @@ impl Plan {
         let photons = planner.caustics(followed, &lights);
         let paths = planner.paths.then_some(Paths { guided, photons });
         let rays = planner.rays(&transmission, &images, &lights, samples);
-        let rough_transmission = planner.rough_transmission(&lights, samples);
+        let rough_transmission = planner.rough_transmission(&transmission, &lights, samples);
         let (bands, disperses) = planner.wavelengths(&transmission);
         let from_points = lights.directional + lights.local > 0 && paths.is_none();
         let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && from_points;
@@ -373,7 +373,8 @@ impl Planner<'_> {
     /// extent.
     fn light_samples(&mut self, followed: bool) -> LightSamples {
         let Self { scene, surfaces, decisions, knobs, paths, bounds, .. } = self;
-        let lit = surfaces.any(|m| !m.unlit && (*paths || scatters(m) || mirrors(m) || m.clearcoat > 0.0));
+        let sends = |m: &Material| *paths || scatters(m) || mirrors(m) || m.clearcoat > 0.0 || transmits_roughly(m);
+        let lit = surfaces.any(|m| !m.unlit && sends(m));
         let sends_light = |m: &Material| match *paths {
             true if m.unlit => m.base_color[..3] != [0.0; 3],
             true => m.emissive != [0.0; 3],
@@ -507,10 +508,11 @@ impl Planner<'_> {
     }
 
     /// Lobes of rough transmission that are evaluated: for all light of paths, and in other models for lights behind
-    /// thin-walled surfaces.
-    fn rough_transmission(&mut self, lights: &Lights, samples: LightSamples) -> bool {
+    /// thin-walled surfaces, as which bodies are drawn where no rays refract.
+    fn rough_transmission(&mut self, transmission: &Transmission, lights: &Lights, samples: LightSamples) -> bool {
         let Self { surfaces, decisions, paths, .. } = self;
-        let transmits = |m: &Material| m.transmission > 0.0 && wider(m, SMOOTHEST) && (*paths || surfaces.is_sheet(m));
+        let is_thin = |m: &Material| !transmission.by_rays || surfaces.is_sheet(m);
+        let transmits = |m: &Material| transmits_roughly(m) && (*paths || is_thin(m));
         let cause = match *paths || lights.directional + lights.local > 0 || samples.shaped {
             true => surfaces.cause(transmits, |m| format!("transmits light with roughness {}", m.roughness)),
             false => Cause::against("no light shines through surfaces"),
@@ -599,6 +601,11 @@ impl Planner<'_> {
 /// smooth the material is across it.
 fn wider(m: &Material, bound: f32) -> bool {
     m.roughness > bound || m.has_direction()
+}
+
+/// Whether a lamp behind a surface of this material may be seen in it.
+fn transmits_roughly(m: &Material) -> bool {
+    m.transmission > 0.0 && wider(m, SMOOTHEST)
 }
 
 /// The verdict on effects that path tracing replaces.

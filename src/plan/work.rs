@@ -50,7 +50,7 @@ pub struct Plan {
     pub local_lights: u32,
     /// Tiled light culling.
     pub tiles: bool,
-    /// The table of directional albedo: for the split sum of an environment, and for energy compensation of multiple
+    /// The tables of lobes: for the split sum of an environment, and for energy compensation of multiple
     /// scattering.
     pub reflectance: bool,
     /// Shadow maps for the lights.

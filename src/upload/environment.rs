@@ -163,7 +163,7 @@ fn one_texel(environment: &Environment) -> Levels {
 }
 
 /// The mip chain of the map, down to a single texel: each texel is the mean of its directions, so rows count by their
-/// solid angle.
+/// solid angle. Of an odd number of rows the last one is left out.
 fn mean_chain(environment: &Environment) -> Levels {
     let texels = environment.radiance.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
     let mut levels: Levels = vec![(environment.width, environment.height, texels)];
@@ -248,13 +248,18 @@ fn prefilter(device: &Arc<Device>, sky: &Image, chain: &Levels) -> Result<Levels
 /// Hexadecimal digits of [`file::hash`].
 const HASH_BYTES: usize = 32;
 
-/// The cache file of the prefiltered levels, named by hashes of the map's texels, of the shader and of the device.
+/// The cache file of the prefiltered levels, named by hashes of the map's texels at all mip levels, of the shader with
+/// its numbers of samples, and of the device.
 fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
     let folder = file::cache_folder()?;
-    let map = file::hash(bytemuck::cast_slice(&chain[0].2));
+    let levels: Vec<String> = chain.iter().map(|(.., texels)| file::hash(bytemuck::cast_slice(texels))).collect();
+    let map = file::hash(levels.concat().as_bytes());
     let words: &[u8] = bytemuck::cast_slice(prefilter::PROGRAM.stages[0].words);
+    let samples: [u32; 3] = [MOST_LOOKUPS, FEWEST_SAMPLES, MOST_SAMPLES];
     let info = device.info();
-    let maker = file::hash(&[words, info.name.as_bytes(), info.driver.as_bytes(), info.version.as_bytes()].concat());
+    let samples: &[u8] = bytemuck::cast_slice(&samples);
+    let maker =
+        file::hash(&[words, samples, info.name.as_bytes(), info.driver.as_bytes(), info.version.as_bytes()].concat());
     let (width, height, _) = chain[0];
     Some(folder.join(format!("environment-{map}-{maker}-{width}x{height}")))
 }

@@ -53,7 +53,7 @@ pub fn tables(lobes: u32) -> &'static [Texel] {
     })
 }
 
-/// LobeSums over samples of a lobe, or of a part of it: of the weights, and of the directions by their weights.
+/// Sums over samples of a lobe, or of a part of it: of the weights, and of the directions by their weights.
 #[derive(Debug, Clone, Copy, Default)]
 struct LobeSums {
     weight: f64,
