@@ -176,6 +176,8 @@ fn surfaces_do_not_affect_each_other() {
     // A rough sheet is as rough beside smooth mirrors as beside rough ones.
     is_same("rough sheet", &pair(Material { thickness: 0.0, ..glass() }, mirror()), &["refraction=off"]);
     is_same("rough glass", &pair(glass(), mirror()), &[]);
+    // Where no rays refract it is thin-walled, and the lamp shines through it.
+    is_same("rough glass in the picture", &pair(glass(), mirror()), &["refraction=off"]);
     // Metal transmits nothing, the rest scatters.
     let mut half = pair(Material { metallic: 0.5, ..glass() }, mirror());
     half.0.studio = Some(1.0);
