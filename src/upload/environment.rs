@@ -55,7 +55,7 @@ pub struct EnvironmentRotation {
     pub blur: f32,
 }
 
-pub(super) type Texel = [f32; 4];
+type Texel = [f32; 4];
 
 /// A mip chain: width, height and texels of each level.
 type Levels = Vec<(u32, u32, Vec<Texel>)>;

@@ -10,12 +10,13 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::environment::Texel;
 use crate::scene::lobe::LOBES;
 use crate::share;
 
 /// Side of each table, over cosθ and perceptual roughness.
 pub const SIDE: u32 = share::LOBE_TABLE_SIDE;
+type Texel = [f32; 4];
+
 /// Samples of a lobe.
 const SAMPLES: u32 = 512;
 /// The cosine for the last column of means: at 1 the direction of reflection is the normal, and nothing lies between.

@@ -133,7 +133,7 @@ fn parts_that_do_not_belong_together_are_named() {
         ("a1", "of 2 parts, these are missing: 2"),
         ("a1 a2 a2", "are the same part, 2 of 2"),
         ("a1 b2", "setting seed, 0 and 3"),
-        ("a1 c2", "knob brdf, ggx and blinn-phong"),
+        ("a1 c2", "knob brdf, ggx-multi and blinn-phong"),
         ("a1 d2", "two different divisions of the picture: 1 of 2 by tiles"),
         ("a1 e2", "they show two scenes"),
         ("a1 f2.exr", "f2.exr is not a part of a picture"),
