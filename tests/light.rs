@@ -595,25 +595,31 @@ fn room() -> Environment {
     Environment { name: "lamp".to_owned(), width: 256, height: 128, radiance }
 }
 
-/// Returns the first channel of a map filtered by a GGX lobe about `n`: ∫ L D(h) G1(l) dω over the same integral with
-/// L = 1, for n = v = r.
-fn through_lobe(map: &Environment, n: DVec3, alpha: f64) -> f64 {
+/// Returns the mean of a map's first channel over all directions, by solid angle and a weight.
+fn mean_of_map(map: &Environment, weight: impl Fn(DVec3) -> f64) -> f64 {
     let (width, height) = (f64::from(map.width), f64::from(map.height));
     let (mut sum, mut whole) = (0.0, 0.0);
     for (i, radiance) in map.radiance.iter().enumerate() {
         let (x, y) = (i as u32 % map.width, i as u32 / map.width);
         let l = environment::direction((f64::from(x) + 0.5) / width, (f64::from(y) + 0.5) / height);
-        let cos_l = n.dot(l);
-        if cos_l > 0.0 {
-            let cos_h2 = 0.5 * (1.0 + cos_l);
-            let d = (cos_h2 * (alpha * alpha - 1.0) + 1.0).powi(-2);
-            let g1 = 2.0 / (1.0 + (1.0 + alpha * alpha * (cos_l.powi(-2) - 1.0)).sqrt());
-            let weight = d * g1 * (1.0 - l.y * l.y).sqrt();
-            sum += weight * f64::from(radiance[0]);
-            whole += weight;
-        }
+        let weight = weight(l) * (1.0 - l.y * l.y).sqrt();
+        sum += weight * f64::from(radiance[0]);
+        whole += weight;
     }
     sum / whole
+}
+
+/// Returns a map filtered by a GGX lobe about `n`: ∫ L D(h) G1(l) dω over the same integral with L = 1, for n = v = r.
+fn through_lobe(map: &Environment, n: DVec3, alpha: f64) -> f64 {
+    mean_of_map(map, |l| {
+        let cos_l = n.dot(l);
+        if cos_l <= 0.0 {
+            return 0.0;
+        }
+        let cos_h2 = 0.5 * (1.0 + cos_l);
+        let d = (cos_h2 * (alpha * alpha - 1.0) + 1.0).powi(-2);
+        d * 2.0 / (1.0 + (1.0 + alpha * alpha * (cos_l.powi(-2) - 1.0)).sqrt())
+    })
 }
 
 /// What is seen directly is blurred, also through glass; what lights surfaces is the environment as it is.
@@ -675,22 +681,10 @@ fn a_blurred_background_is_the_environment_through_a_lobe() {
     }
 }
 
-/// Returns the first channel of a map through the GGX lobe of a white metal about +Z, seen from the unit direction v:
-/// ∫ L f cosθ dω over the same integral with L = 1.
+/// Returns a map through the GGX lobe of a white metal about +Z, seen from the unit direction v: ∫ L f cosθ dω over the
+/// same integral with L = 1.
 fn through_lobe_of_metal(map: &Environment, v: DVec3, alpha: f64) -> f64 {
-    let (width, height) = (f64::from(map.width), f64::from(map.height));
-    let (mut sum, mut whole) = (0.0, 0.0);
-    for (i, radiance) in map.radiance.iter().enumerate() {
-        let (x, y) = (i as u32 % map.width, i as u32 / map.width);
-        let l = environment::direction((f64::from(x) + 0.5) / width, (f64::from(y) + 0.5) / height);
-        if l.z > 0.0 {
-            let [.., reflected] = brdf::ggx(DVec3::Z, l, v, alpha, 1.0);
-            let weight = reflected * (1.0 - l.y * l.y).sqrt();
-            sum += weight * f64::from(radiance[0]);
-            whole += weight;
-        }
-    }
-    sum / whole
+    mean_of_map(map, |l| if l.z > 0.0 { brdf::ggx(DVec3::Z, l, v, alpha, 1.0)[4] } else { 0.0 })
 }
 
 /// The lobe of the prefiltered map whose mean is that of the metal's lobe, beside the exact integral and the lobe about
