@@ -523,6 +523,8 @@ fn nodes_are_hidden_views_chosen_and_pictures_saved() {
     // and a scene that is read again is drawn again.
     let arguments = [&file, "--size", "900x600", "--set", "samples=1", "--validate"];
     let mut viewer = Viewer::open(&display, folder, &arguments);
+    // Until the scene has been read, the command leaves the view to `render`, which draws the same.
+    until_its_command(&mut viewer, "a view", |command| command.contains("--eye"));
     let (first, both) = shows_beside_panels(&mut viewer, folder);
     assert!(first.contains("--eye") && !first.contains("--hide"), "{first}");
 
