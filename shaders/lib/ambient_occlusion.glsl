@@ -13,7 +13,7 @@
 //    the other walls of a lampshade: it lets E₀ through, by its albedo τ of diffuse transmission, and gives back what
 //    arrives there. E = V E₀ + (1 − V)(τ E₀ + ρ E).
 // Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities).
-// Assumes: bvh space, metres; a compensated surface.
+// Assumes: bvh space, metres; a surface whose `lobe` is known.
 #ifndef AMBIENT_OCCLUSION_GLSL
 #define AMBIENT_OCCLUSION_GLSL
 #include "lib/environment_light.glsl"

@@ -103,6 +103,7 @@ Layers passing_layers_at(HitSurface hit, Boundary boundary) {
         b.tint = tint_through(hit.s.base, boundary.sheet, hit.front, hit.sigma_thickness * hit.thickness);
         b.transmits = hit.transmits * (1.0 - hit.s.metallic);
     }
+    b.base_apart = false;
     b.from_behind = false;
     b.shares = vec4(0.0);
     return b;
@@ -111,11 +112,11 @@ Layers passing_layers_at(HitSurface hit, Boundary boundary) {
 // The same with the energy compensation of a rough base, and what that base leaves to the layer below.
 Layers layers_at(HitSurface hit, Boundary boundary) {
     Layers b = passing_layers_at(hit, boundary);
-    if (!b.delta) compensate(b.s);
+    if (!b.delta) b.s.lobe = lobe_reflectance(b.s);
     if (ROUGH && BRDF == BRDF_GGX_MULTI && !b.delta) {
         // The albedo of an interface is that between its two media, by its reflectance at the viewer's angle: all that its lobe
         // scatters under total reflection, which the albedo in air would leave to the layer below once more.
-        vec3 scattered = b.f_dielectric * b.s.compensation * (b.s.lobe.x + b.s.lobe.y);
+        vec3 scattered = b.f_dielectric * compensation(b.s) * (b.s.lobe.x + b.s.lobe.y);
         b.enters = b.solid ? 1.0 - min(largest(scattered), 1.0) : ground_share(albedo_of_base(b.s));
     }
     return b;

@@ -26,7 +26,7 @@ vec4 shares_of(Layers b) {
     float mirrors = mean(b.f_base);
     // Facets tilted away from the normal reflect more than the viewer's angle suggests. A small reflectance at normal
     // incidence may be ten times as large there, so the lobe is sampled at least that often.
-    if (!b.delta && mirrors > 0.0) mirrors = max(mirrors * mean(b.s.compensation), LEAST_SHARE);
+    if (!b.delta && mirrors > 0.0) mirrors = max(mirrors * mean(compensation(b.s)), LEAST_SHARE);
     float coat = CLEARCOAT ? 1.0 - b.under : 0.0;
     float left = 1.0 - coat;
     if (CLEARCOAT && !b.coat_delta && coat > 0.0) {

@@ -1,5 +1,5 @@
 // Light of the environment on the layers of a surface, from its irradiance and from the radiance in its lobes' directions.
-// Where to read: RTR 4, sections 10.5 and 10.6 (environment lighting, split sum). Assumes: a compensated surface.
+// Where to read: RTR 4, sections 10.5 and 10.6 (environment lighting, split sum). Assumes: a surface whose `lobe` is known.
 #ifndef ENVIRONMENT_LIGHT_GLSL
 #define ENVIRONMENT_LIGHT_GLSL
 #include "lib/environment.glsl"
@@ -47,7 +47,7 @@ vec3 diffuse_environment_light(EnvironmentFactors f, vec3 irradiance) {
 const uint LOBE_PARTS = 16;
 
 vec3 radiance_in_round_base_lobe(Surface s) {
-    RoundLobe lobe = round_lobe(s.n, s.v, s.roughness, s.alpha, vec2(mean(s.f0), s.f90) * s.lobe);
+    RoundLobe lobe = round_lobe(s.n, s.v, s.roughness, s.alpha, vec2(mean(f0_of(s)), f90_of(s)) * s.lobe);
     return prefiltered_radiance(lobe.direction, lobe.alpha);
 }
 

@@ -207,17 +207,23 @@ struct BaseAlbedo {
     vec3 base;       // of the mixture with the metallic part, under the lobes of extensions
 };
 
+// Energy compensation of the base's lobe for single scattering, where the knob `brdf` is `ggx-multi`.
+vec3 compensation(Surface s) {
+    return BRDF == BRDF_GGX_MULTI ? ggx_compensation(f0_of(s), s.lobe.x + s.lobe.y) : vec3(1.0);
+}
+
 BaseAlbedo albedo_of_base(Surface s) {
     vec2 ab = s.lobe;
     vec3 dielectric = s.f0_dielectric * ab.x + s.f90_dielectric * ab.y;
-    vec3 base = s.f0 * ab.x + s.f90 * ab.y;
+    vec3 base = f0_of(s) * ab.x + f90_of(s) * ab.y;
     if (FRESNEL == FRESNEL_EXACT || IRIDESCENCE) {
         BaseFresnel f = fresnel_of_base(s, mean_cosine(ab));
         bool at_mean = FRESNEL == FRESNEL_EXACT || s.film.x > 0.0;
         dielectric = at_mean ? f.dielectric * (ab.x + ab.y) : dielectric;
         base = at_mean ? blend(f.dielectric, f.metal, s.metallic) * (ab.x + ab.y) : base;
     }
-    return BaseAlbedo(dielectric * s.compensation, base * s.compensation * left_to_base(s));
+    vec3 compensated = compensation(s);
+    return BaseAlbedo(dielectric * compensated, base * compensated * left_to_base(s));
 }
 
 // `ab` is the table's texel for the coat, f its Fresnel reflectance at mean_cosine(ab).
@@ -270,17 +276,11 @@ vec3 scattered_per_irradiance(Surface s, BaseAlbedo albedo) {
     return scattered;
 }
 
-// The base's lobe as a whole: its reflectance, and energy compensation for single scattering where the knob `brdf` is `ggx-multi`.
-void compensate(inout Surface s) {
-    s.lobe = lobe_reflectance(s);
-    if (BRDF == BRDF_GGX_MULTI) s.compensation = ggx_compensation(s.f0, s.lobe.x + s.lobe.y);
-}
-
 // --------------------------------------------------------------------------------------------------------------------
 // The layers together
 
 struct Layers {
-    Surface s;         // compensated; its diffuse albedo excludes what is transmitted
+    Surface s;         // its `lobe` is known; its diffuse albedo excludes what is transmitted
     float cos_v;       // cosine between shading normal and viewer, at least 1e-4
     bool between;      // the media on both sides are known, as for a ray: solid, n1 and n2 hold
     bool solid;        // interface of a closed dielectric mesh
@@ -298,16 +298,18 @@ struct Layers {
     float through_share; // fraction of the diffuse light that diffuse transmission sends to the other side
     vec3 tint;         // colour of transmitted light
     float transmits;   // fraction of the entering light that is transmitted
+    bool base_apart;   // what the base reflects is found by a ray or in the picture: evaluate_reflection leaves it out
     bool from_behind;  // light comes through this rough thin-walled surface: evaluate_reflection takes its mirrored direction
     vec4 shares;       // selection probabilities of coat, base, diffuse base layer, transmission for paths; their sum is 1, or 0
 };
 
-// The layers in one turn of a loop over lights: numbers that follow from F0 alone are computed in it, and take no registers
-// while shadow rays are traced.
+// The layers in one turn of a loop over lights: numbers that follow from F0 and from the albedo of the lobe are computed in it,
+// and take no registers while shadow rays are traced.
 Layers in_turn(Layers b, uint of_turn) {
     b.s.f0_dielectric = found_anew(b.s.f0_dielectric, of_turn);
     b.s.f0_metal = found_anew(b.s.f0_metal, of_turn);
     b.s.metallic = found_anew(b.s.metallic, of_turn);
+    b.s.lobe = found_anew(b.s.lobe, of_turn);
     return b;
 }
 
@@ -359,7 +361,7 @@ float diffuse_through_share(Surface s) {
     return DIFFUSE_TRANSMISSION && through > 0.0 ? through / (reflected + through) : 0.0;
 }
 
-// The directional albedos of a compensated surface's layers.
+// The directional albedos of a surface's layers; its `lobe` is known.
 struct LayerAlbedo {
     BaseAlbedo base;
     float coat;       // 0 without a coat
@@ -397,6 +399,7 @@ Layers layers_of(Surface s, LayerAlbedo albedo) {
     b.through_share = diffuse_through_share(s);
     b.tint = vec3(0.0);
     b.transmits = 0.0;
+    b.base_apart = false;
     b.from_behind = false;
     b.shares = vec4(0.0);
     return b;
@@ -498,7 +501,7 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
                 // ∞). It is 0.31 F0 for a shininess of 0, 0.41 F0 for 1, 0.81 F0 for 10 and 0.98 F0 for 100 (numerics.md
                 // S13).
                 float shine = shine_from_alpha(s.alpha);
-                vec3 ks = s.f0 * ((shine + 2.0) * 0.5 * INV_PI);
+                vec3 ks = f0_of(s) * ((shine + 2.0) * 0.5 * INV_PI);
                 float cosine_power = phong_lobe(h, shine);
                 // The bound of B6, k_d π + k_s 2π/(shine + 2) ≤ 1; B5 has no bound.
                 enters = BRDF == BRDF_BLINN_PHONG ? 1.0 : 1.0 - largest(s.f0_dielectric);
@@ -509,12 +512,12 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
                 // counts, so that a tinted F0 gives no complementary colour (KHR_materials_specular).
                 FacetFresnel f = fresnel_below_coat(b, h.cos_d);
                 if (BRDF == BRDF_GGX) enters = 1.0 - largest(f.dielectric);
-                lobe = b.from_behind ? s.passes * ((1.0 - largest(f.dielectric)) * base.value) : f.base * s.compensation * base.value;
+                lobe = b.from_behind ? s.passes * ((1.0 - largest(f.dielectric)) * base.value) : f.base * compensation(s) * base.value;
             }
             r.pdf += b.shares.y * base.pdf;
         }
-        r.f_cos = (s.diffuse * diffuse_brdf(enters) + lobe) * cos_l;
-        if (BRDF == BRDF_BLINN_PHONG) r.f_cos += lobe_alone;
+        r.f_cos = (s.diffuse * diffuse_brdf(enters) + (b.base_apart ? vec3(0.0) : lobe)) * cos_l;
+        if (BRDF == BRDF_BLINN_PHONG && !b.base_apart) r.f_cos += lobe_alone;
         // For light from l to the eye, sheen leaves the smaller of its values for both directions (KHR_materials_sheen).
         if (SHEEN) r.f_cos = r.f_cos * min(b.left, left_by_sheen(s, cos_l)) + sheen_lobe(s, h.sin2_h, cos_l, b.cos_v);
         r.pdf += b.shares.z * (1.0 - b.through_share) * cos_l * INV_PI;
@@ -652,7 +655,7 @@ LobeSample sample_base(Layers b, vec3 h, FacetFresnel f) {
     Surface s = b.s;
     vec3 r = reflect_ray(-s.v, h).R;
     float masking = ROUGH && !b.delta ? unshadowed_base(s, r) : 1.0;
-    return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f.base * s.compensation * (masking * b.left), false);
+    return LobeSample(b.delta ? on_side(r, s.n_triangle) : r, f.base * compensation(s) * (masking * b.left), false);
 }
 
 LobeSample sample_transmission(Layers b, vec3 h, FacetFresnel f) {

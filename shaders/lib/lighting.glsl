@@ -54,10 +54,7 @@ layout(constant) const bool LIT_AT_HITS = false;
 Layers without_mirrors(Layers b, uint surface) {
     bool on_screen = SCREEN_MIRRORS && (surface == 0 || surface == FIRST_FRAGMENT);
     bool is_round = !ANISOTROPY || !is_anisotropic(b.s);
-    if (b.s.base_traced || (on_screen && is_round && b.s.roughness <= ROUGHEST_MIRROR)) {
-        b.s.f0 = vec3(0.0);
-        b.s.compensation = vec3(0.0);
-    }
+    if (b.s.base_traced || (on_screen && is_round && b.s.roughness <= ROUGHEST_MIRROR)) b.base_apart = true;
     // What emits is seen behind: by the ray that goes on, or clear, in the picture.
     b.s.passes = vec3(0.0);
     if (CLEARCOAT && (b.s.coat_traced || (on_screen && b.s.clearcoat_roughness <= ROUGHEST_MIRROR))) {
@@ -149,9 +146,9 @@ struct LightRange {
     uint end_word;
 };
 
-// The light of a surface that waits while shadow rays are traced (VECTORS_WAIT).
-const uint WAITING_FROM_LIGHTS = 0; // from those so far
-const uint WAITING_FROM_AROUND = 1; // emission and environment
+// What waits while shadow rays are traced (VECTORS_WAIT).
+const uint WAITING_LIGHT = 0;   // of the surface so far
+const uint WAITING_DIFFUSE = 1; // the albedo of its diffuse base layer
 shared vec3 light_waiting[VECTORS_WAIT ? 2u * TRACING_LANES : 1u];
 
 // Loop iterations after which no further light is started.
@@ -160,12 +157,14 @@ layout(constant) const uint LIGHT_BUDGET = 0xffffffffu;
 // Light samples that no iteration was left for, where no other light is missing.
 uint samples_cut_off = 0;
 
-// `surface` is the number of the surface, for the random numbers.
-vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
-    vec3 sum = vec3(0.0);
+// The light so far, `sum`, with that of the lights in `range`. `surface` is the number of the surface, for the random numbers.
+vec3 with_lights(vec3 sum, Layers b, ivec2 pixel, uint surface, uint tiles_across, LightRange range) {
     if (DIRECTIONAL_LIGHTS + LIGHT_SAMPLES + LOCAL_LIGHTS + SKY_RAYS + TILE_WORDS == 0) return sum;
     if (SKY_RAYS > 0) sky_shown = NOTHING_SHOWN;
-    if (VECTORS_WAIT) light_waiting[waiting_word(WAITING_FROM_LIGHTS, 0)] = sum;
+    if (VECTORS_WAIT) {
+        light_waiting[waiting_word(WAITING_LIGHT, 0)] = sum;
+        light_waiting[waiting_word(WAITING_DIFFUSE, 0)] = b.s.diffuse;
+    }
     // The lights of the tile are a bit mask, read in ascending order. A loop of its own skips empty words: lavapipe runs
     // the body of a loop at least once, and the body for a light is long.
     int tile = int((uint(pixel.y) / TILE * tiles_across + uint(pixel.x) / TILE) * TILE_WORDS);
@@ -193,30 +192,29 @@ vec3 radiance_from_lights(Layers b, ivec2 pixel, uint surface, uint tiles_across
         bits = listed ? bits & (bits - 1) : bits;
         next += listed ? 0 : 1;
         b = in_turn(b, index);
+        if (VECTORS_WAIT) b.s.diffuse = light_waiting[waiting_word(WAITING_DIFFUSE, index)];
         vec3 light = light_on(b, index, is_sample, is_sky, uvec2(pixel), surface);
         if (VECTORS_WAIT) {
-            light_waiting[waiting_word(WAITING_FROM_LIGHTS, index)] += light;
+            light_waiting[waiting_word(WAITING_LIGHT, index)] += light;
         } else {
             sum += light;
         }
     }
-    return VECTORS_WAIT ? light_waiting[waiting_word(WAITING_FROM_LIGHTS, next)] : sum;
+    return VECTORS_WAIT ? light_waiting[waiting_word(WAITING_LIGHT, next)] : sum;
 }
 
 // The environment's light is added apart, with visibility (lib/ambient_occlusion.glsl).
 layout(constant) const bool ENVIRONMENT_APART = false;
 
-// Radiance to the eye of a compensated surface, from the lights in `range`; with `all_around` also emission and
+// Radiance to the eye of a surface whose `lobe` is known, from the lights in `range`; with `all_around` also emission and
 // environment.
 vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, LightRange range, bool all_around) {
     LayerAlbedo albedo = layer_albedo(s, albedo_of_base(s));
     // Before the lights: afterwards the albedos would take registers while shadow rays are traced.
     vec3 around = s.emissive * under_coat(s);
     if ((AMBIENT || REFLECTION) && !ENVIRONMENT_APART) around += environment_light(s, albedo);
-    if (VECTORS_WAIT) light_waiting[waiting_word(WAITING_FROM_AROUND, 0)] = around;
-    vec3 result = radiance_from_lights(layers_of(s, albedo), pixel, surface, tiles_across, range);
-    if (VECTORS_WAIT) around = light_waiting[waiting_word(WAITING_FROM_AROUND, shadow_rays)];
-    result += all_around ? around : vec3(0.0);
-    return s.unlit ? all_around ? s.base : vec3(0.0) : result;
+    if (!all_around || s.unlit) around = all_around ? s.base : vec3(0.0);
+    vec3 result = with_lights(around, layers_of(s, albedo), pixel, surface, tiles_across, range);
+    return s.unlit ? around : result;
 }
 #endif

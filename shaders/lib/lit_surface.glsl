@@ -7,7 +7,7 @@
 struct LitSurface {
     bool drawn;
     bool suppressed; // an interface suppressed by priority: it does nothing
-    Surface s;       // compensated; its diffuse part is what is not transmitted
+    Surface s;       // its `lobe` is known; its diffuse part is what is not transmitted
 };
 
 LitSurface lit_surface(ivec2 pixel) {
@@ -23,7 +23,7 @@ LitSurface lit_surface(ivec2 pixel) {
         uvec4 beyond = primary.hit.front ? entered(r.s.media, medium) : left(r.s.media, medium);
         r.suppressed = present_medium(beyond) == present_medium(r.s.media);
     }
-    compensate(r.s);
+    r.s.lobe = lobe_reflectance(r.s);
     return r;
 }
 #endif

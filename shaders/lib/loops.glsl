@@ -31,6 +31,10 @@ float found_anew(float x, uint of_turn) {
     return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
 }
 
+vec2 found_anew(vec2 x, uint of_turn) {
+    return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
+}
+
 vec3 found_anew(vec3 x, uint of_turn) {
     return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
 }

@@ -132,7 +132,7 @@ bool mirrored_by_ray(HitSurface hit, Boundary boundary) {
 Surface surface_for_lights(HitSurface hit, Boundary boundary, uint leaf) {
     Surface s = hit.s;
     if (TRANSMISSIVE && !boundary.solid) seen_from(s, index_of(boundary.medium_in));
-    compensate(s);
+    s.lobe = lobe_reflectance(s);
     keep_diffuse(s, 1.0 - hit.transmits);
     s.passes = passes_roughly(hit);
     // Single-sided surfaces emit on their front alone, as for light samples.

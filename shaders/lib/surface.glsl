@@ -45,12 +45,9 @@ struct Surface {
     float metallic;
     vec3 f0_dielectric;
     float f90_dielectric;
-    vec3 f0;             // of the mixture of dielectric and metallic part
-    float f90;
     float ior;           // of the dielectric part
     float n_outside;     // index of the medium on the viewer's side
-    vec3 compensation;   // energy compensation of single scattering: 1 but for `ggx-multi`
-    vec2 lobe;           // factors of F0 and F90 in the directional albedo of the base's lobe, once compensated
+    vec2 lobe;           // factors of F0 and F90 in the directional albedo of the base's lobe; 1 and 0 until it is looked up
     float alpha;         // roughness²; with anisotropy α across `tangent`
     float alpha_along;   // α along `tangent`: `alpha` without anisotropy
     vec3 tangent;        // unit direction of anisotropy, perpendicular to n
@@ -75,6 +72,15 @@ struct Surface {
     uint face;           // coplanar group of its triangle, which rays from it cannot hit
     uvec4 media;         // the media on the viewer's side (lib/media.glsl)
 };
+
+// F0 and F90 of the mixture of dielectric and metallic part.
+vec3 f0_of(Surface s) {
+    return blend(s.f0_dielectric, s.f0_metal, s.metallic);
+}
+
+float f90_of(Surface s) {
+    return blend(s.f90_dielectric, 1.0, s.metallic);
+}
 
 // Base colour; `varies` is the product of texel and vertex colour. In a band of wavelengths it is a number, and for unlit
 // materials light.
@@ -142,12 +148,9 @@ Surface surface_from_texels(uint id, Material m, Texels t, vec3 n, vec3 n_coat, 
             s.metal_tint = s.f0_metal / normal_reflectance(s.n_metal, s.kappa_metal);
         }
     }
-    s.f0 = blend(s.f0_dielectric, s.f0_metal, metal);
-    s.f90 = blend(s.f90_dielectric, 1.0, metal);
     s.ior = m.ior;
     s.n_outside = 1.0;
-    s.compensation = vec3(1.0);
-    s.lobe = vec2(0.0);
+    s.lobe = vec2(1.0, 0.0);
     s.roughness = max(t.roughness * m.roughness, MIN_ROUGHNESS);
     s.alpha = s.roughness * s.roughness;
     s.alpha_along = s.alpha;
@@ -194,31 +197,30 @@ void keep_diffuse(inout Surface s, float fraction) {
 // given by a colour alone has no index and keeps its reflectance.
 //
 // If the index does not change, every value is selected unchanged: on some devices a quotient of equal numbers is not 1,
-// and a mixture computed twice differs in its last bit, but both plans of a scene have to agree.
+// but both plans of a scene have to agree.
 void seen_from(inout Surface s, float n_outside) {
+    // New names for what is known: glslang needs more than 24 GB where members of s are selected from themselves
+    // (lib/arithmetic.glsl).
+    vec3 dielectric = s.f0_dielectric;
+    vec3 metal = s.f0_metal;
     bool changes = n_outside != s.n_outside;
-    vec3 dielectric_before = s.f0_dielectric;
-    vec3 metal_before = s.f0_metal;
     float before = nested_f0(s.n_outside, s.ior);
     float r0 = nested_f0(n_outside, s.ior);
     // As for the interfaces of bodies (between_media).
     bool unknown = changes && before == 0.0;
-    s.f0_dielectric = unknown ? vec3(r0) : changes ? s.f0_dielectric * (r0 / before) : s.f0_dielectric;
+    s.f0_dielectric = unknown ? vec3(r0) : changes ? dielectric * (r0 / before) : dielectric;
     // Between equal indices nothing is reflected at any angle.
     s.f90_dielectric = n_outside == s.ior ? 0.0 : unknown ? 1.0 : s.f90_dielectric;
     if (CONDUCTORS) {
         bool relative = changes && s.n_metal.x > 0.0;
-        vec3 n = s.n_metal * (s.n_outside / n_outside);
-        vec3 kappa = s.kappa_metal * (s.n_outside / n_outside);
-        s.f0_metal = relative ? s.metal_tint * normal_reflectance(n, kappa) : s.f0_metal;
-        s.n_metal = relative ? n : s.n_metal;
-        s.kappa_metal = relative ? kappa : s.kappa_metal;
+        float ratio = relative ? s.n_outside / n_outside : 1.0;
+        vec3 n = s.n_metal * ratio;
+        vec3 kappa = s.kappa_metal * ratio;
+        vec3 reflectance = normal_reflectance(n, kappa);
+        s.f0_metal = relative ? s.metal_tint * reflectance : metal;
+        s.n_metal = n;
+        s.kappa_metal = kappa;
     }
-    // No second mix() with the same share: drivers that see two of them round both differently.
-    vec3 mixture = s.f0 + (s.f0_dielectric - dielectric_before) * (1.0 - s.metallic);
-    mixture += (s.f0_metal - metal_before) * s.metallic;
-    s.f0 = changes ? mixture : s.f0;
-    s.f90 = n_outside == s.ior ? s.metallic : unknown ? 1.0 : s.f90;
     s.n_outside = n_outside;
 }
 

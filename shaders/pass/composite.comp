@@ -120,7 +120,7 @@ void main() {
         s.passes = passes_roughly(s, (instances[nodes[at + 2]].flags & INSTANCE_SHEET) != 0, tint, transmission);
         // 5. Lighting of the fragment.
         float alpha = blue_alpha.y;
-        compensate(s);
+        s.lobe = lobe_reflectance(s);
         vec3 shown = radiance_to_eye(s, pixel, surface, tiles_across, all, true);
         // Screen-space reflection for the nearest fragment alone: a ray may march as many steps as the picture is wide.
         if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, surface == FIRST_FRAGMENT));

@@ -24,7 +24,7 @@ void main() {
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     Primary primary = primary_surface(pixel, false);
     if (!primary.drawn) return;
-    compensate(primary.hit.s);
+    primary.hit.s.lobe = lobe_reflectance(primary.hit.s);
     vec3 changed = mirrored_on_screen(primary.hit.s, true);
     if (changed == vec3(0.0)) return;
     vec4 before = imageLoad(radiance, pixel);

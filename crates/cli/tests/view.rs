@@ -230,7 +230,7 @@ fn time_passes_and_settings_are_compared() {
     (0..12).for_each(|_| viewer.key(FULL_STOP, None));
     let half = shows_its_command(&mut viewer, folder);
     assert!(half.contains("--time 0.5 ") && !half.contains("--eye"), "{half}");
-    viewer.drag(1, [150, 130], [180, 140]);
+    viewer.key(TWO, Some(CONTROL));
     viewer.key(SPACE, None);
     std::thread::sleep(Duration::from_millis(700));
     viewer.key(SPACE, None);

@@ -28,10 +28,23 @@ pub static SHEEN: Lobe = Lobe {
 /// D V of white sheen, in 1/sr, from the cosines of both directions and of the half vector with the normal.
 #[must_use]
 pub fn sheen(cos_l: f64, cos_v: f64, cos_h: f64, roughness: f64) -> f64 {
-    let alpha = roughness.max(f64::from(LEAST_ROUGHNESS)).powi(2);
+    let alpha = alpha_of(roughness);
+    distribution(cos_h, alpha) / masking(cos_l, lambda(cos_l, alpha), cos_v, lambda(cos_v, alpha))
+}
+
+fn alpha_of(roughness: f64) -> f64 {
+    roughness.max(f64::from(LEAST_ROUGHNESS)).powi(2)
+}
+
+/// D of inverted Gaussians, in 1/sr.
+fn distribution(cos_h: f64, alpha: f64) -> f64 {
     let sin_h = (1.0 - cos_h * cos_h).max(0.0).sqrt();
-    let d = (2.0 + alpha.recip()) * sin_h.powf(alpha.recip()) / TAU;
-    d / ((1.0 + lambda(cos_l, alpha) + lambda(cos_v, alpha)) * 4.0 * cos_l * cos_v)
+    (2.0 + alpha.recip()) * sin_h.powf(alpha.recip()) / TAU
+}
+
+/// 1 / V, from the cosine and the Λ of both directions.
+fn masking(cos_l: f64, lambda_l: f64, cos_v: f64, lambda_v: f64) -> f64 {
+    (1.0 + lambda_l + lambda_v) * 4.0 * cos_l * cos_v
 }
 
 fn lambda(cos: f64, alpha: f64) -> f64 {
@@ -48,19 +61,22 @@ fn lambda(cos: f64, alpha: f64) -> f64 {
 pub fn albedo(cos_v: f64, roughness: f64) -> f64 {
     const ELEVATIONS: u32 = 128;
     const AZIMUTHS: u32 = 32;
-    let sin_v = (1.0 - cos_v * cos_v).max(0.0).sqrt();
+    let alpha = alpha_of(roughness);
+    let (sin_v, lambda_v) = ((1.0 - cos_v * cos_v).max(0.0).sqrt(), lambda(cos_v, alpha));
+    // The lobe is symmetric: half a turn suffices.
+    let cosines: [f64; AZIMUTHS as usize] =
+        std::array::from_fn(|k| ((k as f64 + 0.5) / f64::from(AZIMUTHS) * PI).cos());
     let mut sum = 0.0;
     for i in 0..ELEVATIONS {
         // Quadratic steps: they are small at the horizon, where most of the lobe lies.
         let x = (f64::from(i) + 0.5) / f64::from(ELEVATIONS);
         let cos_l = x * x;
         let sin_l = (1.0 - cos_l * cos_l).sqrt();
-        for k in 0..AZIMUTHS {
-            // The lobe is symmetric: half a turn suffices.
-            let azimuth = (f64::from(k) + 0.5) / f64::from(AZIMUTHS) * PI;
-            let cos_between = cos_l * cos_v + sin_l * sin_v * azimuth.cos();
+        let masking = masking(cos_l, lambda(cos_l, alpha), cos_v, lambda_v);
+        for cos_azimuth in cosines {
+            let cos_between = cos_l * cos_v + sin_l * sin_v * cos_azimuth;
             let cos_h = ((cos_l + cos_v) / (2.0 + 2.0 * cos_between).sqrt()).min(1.0);
-            sum += sheen(cos_l, cos_v, cos_h, roughness) * cos_l * 2.0 * x;
+            sum += distribution(cos_h, alpha) / masking * cos_l * 2.0 * x;
         }
     }
     sum * TAU / f64::from(ELEVATIONS * AZIMUTHS)
