@@ -12,7 +12,7 @@ use etalon::study::shape::Shape;
 use etalon::transport::bvh::Bvh;
 use etalon::transport::emitters::Sky;
 use etalon::transport::occluders::mean_albedo;
-use etalon::transport::sky_directions::sky_directions;
+use etalon::transport::sky_directions::Sphere;
 use etalon_testing::gpu::{Gpu, knobs, settings, spread};
 use etalon_testing::made::{Made, orthographic, perspective};
 use etalon_testing::raycast::{Options, Ray, World, picture};
@@ -51,7 +51,8 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
     let size = [96, 64];
     let plain = film(&gpu, &scene, &map, size, &["samples=1", "indirect=ambient"]);
     let occluded = film(&gpu, &scene, &map, size, &["samples=1", "indirect=occlusion:16"]);
-    let directions = sky_directions(Sky { map: &map, intensity: 1.0, rotation: 0.0 }, 16, 0);
+    let sphere = Sphere::new(Sky { map: &map, intensity: 1.0, rotation: 0.0 });
+    let lists: Vec<_> = (0..16).map(|list| sphere.directions(16, list)).collect();
     let options = Options { blend: true, textures: false };
     let world = World::new(&scene, options);
     let harmonics = map.irradiance_sh9();
@@ -66,7 +67,8 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
         let n = hit.geometric_normal;
         let origin = hit.position + n * 1e-5;
         let (mut sum, mut all, mut away, mut shut, mut hemisphere) = ([0.0; 3], [0.0; 3], DVec3::ZERO, 0.0, 0.0);
-        for at in &directions {
+        let (x, y) = (i % size[0] as usize, i / size[0] as usize);
+        for at in &lists[y % 4 * 4 + x % 4] {
             let cos = n.dot(at.direction).max(0.0);
             let free = cos > 0.0 && world.closest(&Ray::new(origin, at.direction)).is_none();
             let projected = cos * at.solid_angle;
@@ -180,11 +182,12 @@ fn a_mirror_shows_what_is_occluded() {
     made.camera(DVec3::new(0.1, 5.0, -3.0), DVec3::new(0.1, 5.0, 0.0), orthographic(0.02));
     let got = film(&gpu, &made.0, &map, [16, 16], &["reflection=ray", "samples=16", "indirect=occlusion:64"]);
     let expected = 0.6 * 0.5 / (1.0 - 0.6 * 0.5);
-    for pixel in &got.rgba {
-        let ratio = f64::from(pixel[0]) / expected;
-        // Sixteen directions for each of 16 samples: the mean of their ratios is 2 % off. Without visibility: 40 %.
-        assert!((ratio - 1.0).abs() < 0.03, "{pixel:?}, not {expected}");
-    }
+    // Sixteen directions for each of 16 samples: the mean of their ratios is up to 4 % off with one of the four cuts,
+    // and 1.3 % with all. Without visibility: 40 %.
+    let ratios: Vec<f64> = got.rgba.iter().map(|pixel| f64::from(pixel[0]) / expected).collect();
+    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    assert!((mean - 1.0).abs() < 0.02, "{mean} of {expected}");
+    assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.05), "{ratios:?} of {expected}");
 }
 
 #[test]

@@ -1,8 +1,9 @@
 // Ray-traced ambient occlusion: light of the environment on a surface, with the visibility of the environment.
-// 1. Irradiance. Directions l are the middles of regions of the environment, once for all pixels: a median cut
+// 1. Irradiance. Directions l are the middles of regions of the environment: a median cut
 //    (src/transport/sky_directions.rs), with the regions' power as weights w. Σ w cos θ V / Σ w cos θ is the share of the
 //    irradiance that arrives; it multiplies the irradiance without occluders. The ratio is 1 where nothing occludes,
-//    whatever the directions are, and neighbouring pixels have no noise between them.
+//    whatever the directions are. The pixels of a small square have different ones (interleaved sampling): with the same
+//    in all pixels, what occludes throws a faint hard shadow for each direction.
 // 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
 //    radiance (split sum).
 // 3. Interreflection. What occludes the share O of the directions is taken to face this surface, and to have the same share
@@ -12,7 +13,8 @@
 // 4. Light from behind, which a surface transmits diffusely. What occludes its back is taken to be of the same material, as
 //    the other walls of a lampshade: it lets E₀ through, by its albedo τ of diffuse transmission, and gives back what
 //    arrives there. E = V E₀ + (1 − V)(τ E₀ + ρ E).
-// Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities).
+// Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities); Keller and
+// Heidrich 2001 (interleaved sampling).
 // Assumes: bvh space, metres; a surface whose `lobe` is known.
 #ifndef AMBIENT_OCCLUSION_GLSL
 #define AMBIENT_OCCLUSION_GLSL
@@ -25,6 +27,7 @@
 layout(constant) const uint OCCLUSION_RAYS = 1;    // of a surface, for each sample of a pixel
 layout(constant) const uint SAMPLE_DIRECTIONS = 1; // in the list: those of primary surfaces, then those of others
 layout(constant) const uint FIRST_DIRECTION = 0;   // of the surface's
+layout(constant) const uint PATTERN_SIDE = 1;      // of the square of pixels with different directions: 1, 2 or 4
 layout(constant) const uint LOBE_RAYS = 1;         // in each specular lobe; 0: lobes are not occluded
 
 layout(scene, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
@@ -52,11 +55,21 @@ struct SkyRay {
     float cos_l; // 0 where it is not wanted
 };
 
+// Which of the lists of directions the pixel has: a program sets it. No argument of the functions below, for glslang would need
+// more than 24 GB (lib/arithmetic.glsl).
+uint sky_list = 0;
+
+uint list_of(uvec2 pixel) {
+    uvec2 place = pixel % PATTERN_SIDE;
+    return place.y * PATTERN_SIDE + place.x;
+}
+
 // Direction `i` of a surface. Those between the triangle's plane and that of the interpolated normal count nowhere: a smooth
 // convex mesh does not occlude itself.
 SkyRay sky_ray(Surface s, uint i) {
     SkyRay r;
-    r.sky = sky_directions[trace_terms.sample_index * SAMPLE_DIRECTIONS + FIRST_DIRECTION + i];
+    uint list = trace_terms.sample_index * (PATTERN_SIDE * PATTERN_SIDE) + sky_list;
+    r.sky = sky_directions[list * SAMPLE_DIRECTIONS + FIRST_DIRECTION + i];
     bool shines_through = DIFFUSE_TRANSMISSION && largest(s.diffuse_through) > 0.0;
     r.side = shines_through && dot(s.n_triangle, r.sky.direction) < 0.0 ? -1.0 : 1.0;
     r.cos_l = dot(s.n_triangle, r.sky.direction) * r.side > 0.0 ? max(dot(s.n, r.sky.direction) * r.side, 0.0) : 0.0;

@@ -22,6 +22,7 @@ void main() {
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     LitSurface lit = lit_surface(pixel);
     if (!lit.drawn) return;
+    sky_list = list_of(uvec2(pixel));
     vec3 result = occluded_environment_light(lit.s) * left_at_eye(lit.s);
     if (lit.suppressed || lit.s.unlit) result = vec3(0.0);
     imageStore(radiance, pixel, imageLoad(radiance, pixel) + vec4(result, 0.0));

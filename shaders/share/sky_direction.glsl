@@ -1,4 +1,4 @@
-// Directions in which rays of ambient occlusion look at the environment, the same for all pixels.
+// Directions in which rays of ambient occlusion look at the environment.
 #ifndef SHARE_SKY_DIRECTION_GLSL
 #define SHARE_SKY_DIRECTION_GLSL
 struct SkyDirection {

@@ -18,8 +18,8 @@ use crate::plan::Plan;
 use crate::scene::environment::Environment;
 use crate::shader::prefilter;
 use crate::share::{self, SkyDirection};
-use crate::transport;
 use crate::transport::emitters::Sky;
+use crate::transport::sky_directions::Sphere;
 use crate::upload::split_sum;
 
 /// Largest width of the prefiltered map's level 0; a wider environment enters at the first mip level that fits.
@@ -264,7 +264,17 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
     Some(folder.join(format!("environment-{map}-{maker}-{width}x{height}")))
 }
 
-/// The directions of ambient occlusion for all samples of a pixel.
+/// Side of the square of pixels that have different directions of ambient occlusion. With enough directions in a pixel
+/// none stands out, and the cut of many more takes its time.
+pub fn pattern_side(plan: &Plan) -> u32 {
+    match plan.occlusion_rays() * plan.samples {
+        0..=256 => 4,
+        257..=1024 => 2,
+        _ => 1,
+    }
+}
+
+/// The directions of ambient occlusion: for each sample of a pixel a list for each pixel of the pattern.
 fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
     let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else {
         return Buffer::new(device, NOTHING, 0, Place::Device);
@@ -272,11 +282,16 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
     // Of each sample those of primary surfaces, then those of surfaces that rays meet: a coarser cut, whose directions
     // are the middles of larger regions.
     let [primary, hit] = [plan.occlusion_rays(), plan.occlusion_rays_at_hits()];
-    let of_primary = transport::sky_directions::sky_directions(sky, primary * plan.samples, seed);
-    let of_hits = transport::sky_directions::sky_directions(sky, hit * plan.samples, seed);
-    let samples = of_primary.chunks(primary as usize).zip(of_hits.chunks(hit as usize));
-    let directions: Vec<SkyDirection> = samples
-        .flat_map(|(of_primary, of_hit)| of_primary.iter().chain(of_hit))
+    let pixels = pattern_side(plan).pow(2);
+    // Each pixel of the pattern has cuts of its own, about axes of its own.
+    let sphere = Sphere::new(sky);
+    let cut =
+        |rays: u32, pixel: u32| sphere.directions(rays * plan.samples, seed.wrapping_mul(pixels).wrapping_add(pixel));
+    let cuts: Vec<_> =
+        (0..pixels).into_par_iter().map(|pixel| [primary, hit].map(|rays| (rays as usize, cut(rays, pixel)))).collect();
+    let lists = (0..plan.samples as usize).flat_map(|sample| cuts.iter().flatten().map(move |cut| (sample, cut)));
+    let directions: Vec<SkyDirection> = lists
+        .flat_map(|(sample, (rays, cut))| &cut[sample * rays..][..*rays])
         .map(|at| SkyDirection {
             direction: at.direction.as_vec3().to_array(),
             weight: at.weight.map(|w| w as f32),

@@ -123,6 +123,7 @@ impl<'a> OnDevice<'a> {
                 occlusion_rays: with.occlusion,
                 sample_directions: plan.occlusion_rays() + plan.occlusion_rays_at_hits(),
                 first_direction: 0,
+                pattern_side: super::environment::pattern_side(plan),
                 // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
                 lobe_rays: if plan.screen.mirrors { 0 } else { with.occlusion.div_ceil(4) },
             },
