@@ -101,7 +101,7 @@ fn cut(mut pieces: Vec<Piece>, count: usize, from_left: bool) -> Vec<Piece> {
     let axis = variance.max_position();
     // Their places are sorted, and pieces moved once: in half of the time.
     let mut places: Vec<(f64, u32)> = (0..).zip(&pieces).map(|(i, piece)| (piece.direction[axis], i)).collect();
-    places.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    places.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     pieces = places.into_iter().map(|(_, i)| pieces[i as usize]).collect();
     // The piece in which the cut lies is parted: a lamp of one texel may be several regions.
     let on_left = if from_left { count.div_ceil(2) } else { count / 2 };
@@ -143,10 +143,9 @@ impl Sphere {
 
     /// `count` directions; `seed` turns the axes of the cuts.
     #[must_use]
-    pub fn directions(&self, count: u32, seed: u32) -> Vec<SkyDirection> {
+    pub fn directions(&self, count: u32, seed: u64) -> Vec<SkyDirection> {
         let golden_angle = PI * (3.0 - 5.0_f64.sqrt());
-        let map_from_cuts =
-            DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), f64::from(seed) * golden_angle);
+        let map_from_cuts = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), seed as f64 * golden_angle);
         let cuts_from_map = map_from_cuts.transpose();
         let world_from_cuts = DMat3::from_rotation_y(self.rotation.to_radians()) * map_from_cuts;
         let mut pieces = self.pieces.clone();

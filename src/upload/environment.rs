@@ -40,7 +40,7 @@ pub struct EnvironmentOnDevice {
     reflectance: Image,
     /// [`share::EnvironmentTerms`].
     pub terms: Buffer,
-    /// Directions of ambient occlusion for all samples of a pixel: [`SkyDirection`].
+    /// Directions of ambient occlusion for all samples of the pixels of a pattern: [`SkyDirection`].
     pub sky_directions: Buffer,
 }
 
@@ -268,7 +268,7 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
 /// none stands out, and the cut of many more takes its time.
 pub fn pattern_side(plan: &Plan) -> u32 {
     match plan.occlusion_rays() * plan.samples {
-        0..=256 => 4,
+        1..=256 => 4,
         257..=1024 => 2,
         _ => 1,
     }
@@ -285,8 +285,9 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
     let pixels = pattern_side(plan).pow(2);
     // Each pixel of the pattern has cuts of its own, about axes of its own.
     let sphere = Sphere::new(sky);
-    let cut =
-        |rays: u32, pixel: u32| sphere.directions(rays * plan.samples, seed.wrapping_mul(pixels).wrapping_add(pixel));
+    let cut = |rays: u32, pixel: u32| {
+        sphere.directions(rays * plan.samples, u64::from(seed) * u64::from(pixels) + u64::from(pixel))
+    };
     let cuts: Vec<_> =
         (0..pixels).into_par_iter().map(|pixel| [primary, hit].map(|rays| (rays as usize, cut(rays, pixel)))).collect();
     let lists = (0..plan.samples as usize).flat_map(|sample| cuts.iter().flatten().map(move |cut| (sample, cut)));
