@@ -8,7 +8,9 @@ use serde::Serialize;
 
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
-use etalon::plan::rungs::{Caustics, Colour, Guiding, Indirect, LightSampler, Lights, Reflection, Refraction, Shadows};
+use etalon::plan::rungs::{
+    Absorption, Caustics, Colour, Guiding, Indirect, LightSampler, Lights, Reflection, Refraction, Shadows,
+};
 use etalon::plan::{Choice, Effect, EffectId, EffectState, ForcedEffects, Knob, Knobs, Model};
 use etalon::prepare::Original;
 use etalon::scene::Camera;
@@ -178,7 +180,7 @@ impl Subject<'_> {
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
     match effect {
-        EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Knobs::of(Model::Recursive).absorption.choice()],
+        EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
         EffectId::PathTracing => paths.into(),
         EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
         EffectId::EmissiveLights | EffectId::AreaLights | EffectId::LightHierarchy => {

@@ -345,7 +345,7 @@ knob! {
         #[doc = march_about!(64)]
         March64 = "march:64",
     }
-    presets: [Thickness, March16, March32],
+    presets: [Thickness, Path, March32],
     exact: March64,
     lecture: ["A1", "A2"],
     effects: [Absorption, HeterogeneousMedia],
