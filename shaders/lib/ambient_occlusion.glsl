@@ -55,7 +55,8 @@ struct SkyRay {
     float cos_l; // 0 where it is not wanted
 };
 
-// Which of the lists of directions the pixel has: a program sets it. No argument of the functions below, for glslang would need
+// Which of the lists of directions the surface has: the program of primary surfaces sets it. Others have one for all pixels: with
+// their fewer directions a pattern would show in mirrors. No argument of the functions below, for glslang would need
 // more than 24 GB (lib/arithmetic.glsl).
 uint sky_list = 0;
 
@@ -68,8 +69,7 @@ uint list_of(uvec2 pixel) {
 // convex mesh does not occlude itself.
 SkyRay sky_ray(Surface s, uint i) {
     SkyRay r;
-    uint list = trace_terms.sample_index * (PATTERN_SIDE * PATTERN_SIDE) + sky_list;
-    r.sky = sky_directions[list * SAMPLE_DIRECTIONS + FIRST_DIRECTION + i];
+    r.sky = sky_directions[trace_terms.sample_index * SAMPLE_DIRECTIONS + FIRST_DIRECTION + sky_list * OCCLUSION_RAYS + i];
     bool shines_through = DIFFUSE_TRANSMISSION && largest(s.diffuse_through) > 0.0;
     r.side = shines_through && dot(s.n_triangle, r.sky.direction) < 0.0 ? -1.0 : 1.0;
     r.cos_l = dot(s.n_triangle, r.sky.direction) * r.side > 0.0 ? max(dot(s.n, r.sky.direction) * r.side, 0.0) : 0.0;

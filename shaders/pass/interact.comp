@@ -93,7 +93,6 @@ void main() {
     // 1. The primary surface, from the G-buffer, and its branches.
     Primary primary = primary_surface(pixel, true);
     if (!primary.drawn) return;
-    sky_list = list_of(uvec2(pixel));
     HitSurface hit = primary.hit;
     Branch ray = ray_to_primary(hit);
     Boundary boundary = boundary_at(hit, ray.media, ray.direction);

@@ -274,25 +274,32 @@ pub fn pattern_side(plan: &Plan) -> u32 {
     }
 }
 
-/// The directions of ambient occlusion: for each sample of a pixel a list for each pixel of the pattern.
+/// Directions of a sample for primary surfaces, of all pixels of the pattern.
+pub fn directions_of_pixels(plan: &Plan) -> u32 {
+    plan.occlusion_rays() * pattern_side(plan).pow(2)
+}
+
+/// The directions of ambient occlusion: for each sample those of primary surfaces, a list for each pixel of the pattern,
+/// then those of surfaces that rays meet: a coarser cut, whose directions are the middles of larger regions.
 fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
     let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else {
         return Buffer::new(device, NOTHING, 0, Place::Device);
     };
-    // Of each sample those of primary surfaces, then those of surfaces that rays meet: a coarser cut, whose directions
-    // are the middles of larger regions.
     let [primary, hit] = [plan.occlusion_rays(), plan.occlusion_rays_at_hits()];
     let pixels = pattern_side(plan).pow(2);
-    // Each pixel of the pattern has cuts of its own, about axes of its own.
+    // Each pixel of the pattern has a cut of its own, about axes of its own.
     let sphere = Sphere::new(sky);
     let cut = |rays: u32, pixel: u32| {
         sphere.directions(rays * plan.samples, u64::from(seed) * u64::from(pixels) + u64::from(pixel))
     };
-    let cuts: Vec<_> =
-        (0..pixels).into_par_iter().map(|pixel| [primary, hit].map(|rays| (rays as usize, cut(rays, pixel)))).collect();
-    let lists = (0..plan.samples as usize).flat_map(|sample| cuts.iter().flatten().map(move |cut| (sample, cut)));
-    let directions: Vec<SkyDirection> = lists
-        .flat_map(|(sample, (rays, cut))| &cut[sample * rays..][..*rays])
+    let of_pixels: Vec<_> = (0..pixels).into_par_iter().map(|pixel| cut(primary, pixel)).collect();
+    let of_hits = cut(hit, 0);
+    let of_sample = |cut: &[_], rays: u32, sample: u32| cut[(sample * rays) as usize..][..rays as usize].to_vec();
+    let directions: Vec<SkyDirection> = (0..plan.samples)
+        .flat_map(|sample| {
+            let of_pixels = of_pixels.iter().map(move |cut| (cut, primary));
+            of_pixels.chain([(&of_hits, hit)]).flat_map(move |(cut, rays)| of_sample(cut, rays, sample))
+        })
         .map(|at| SkyDirection {
             direction: at.direction.as_vec3().to_array(),
             weight: at.weight.map(|w| w as f32),

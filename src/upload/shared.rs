@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 
-use super::environment::EnvironmentOnDevice;
+use super::environment::{EnvironmentOnDevice, directions_of_pixels};
 use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource, Sampled};
@@ -121,7 +121,7 @@ impl<'a> OnDevice<'a> {
             },
             ambient_occlusion: lib::ambient_occlusion::Constants {
                 occlusion_rays: with.occlusion,
-                sample_directions: plan.occlusion_rays() + plan.occlusion_rays_at_hits(),
+                sample_directions: directions_of_pixels(plan) + plan.occlusion_rays_at_hits(),
                 first_direction: 0,
                 pattern_side: super::environment::pattern_side(plan),
                 // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
