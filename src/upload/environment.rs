@@ -279,8 +279,8 @@ pub fn directions_of_pixels(plan: &Plan) -> u32 {
     plan.occlusion_rays() * pattern_side(plan).pow(2)
 }
 
-/// The directions of ambient occlusion: for each sample those of primary surfaces, a list for each pixel of the pattern,
-/// then those of surfaces that rays meet: a coarser cut, whose directions are the middles of larger regions.
+/// The directions of ambient occlusion. For each sample: those of primary surfaces, a list for each pixel of the
+/// pattern; then those of surfaces that rays meet, of a coarser cut.
 fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
     let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else {
         return Buffer::new(device, NOTHING, 0, Place::Device);
