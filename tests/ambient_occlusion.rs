@@ -182,12 +182,11 @@ fn a_mirror_shows_what_is_occluded() {
     made.camera(DVec3::new(0.1, 5.0, -3.0), DVec3::new(0.1, 5.0, 0.0), orthographic(0.02));
     let got = film(&gpu, &made.0, &map, [16, 16], &["reflection=ray", "samples=16", "indirect=occlusion:64"]);
     let expected = 0.6 * 0.5 / (1.0 - 0.6 * 0.5);
-    // Sixteen directions for each of 16 samples: the mean of their ratios is up to 4 % off with one of the four cuts,
-    // and 1.3 % with all. Without visibility: 40 %.
-    let ratios: Vec<f64> = got.rgba.iter().map(|pixel| f64::from(pixel[0]) / expected).collect();
-    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-    assert!((mean - 1.0).abs() < 0.02, "{mean} of {expected}");
-    assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.05), "{ratios:?} of {expected}");
+    for pixel in &got.rgba {
+        let ratio = f64::from(pixel[0]) / expected;
+        // Sixteen directions for each of 16 samples: the mean of their ratios is 2 % off. Without visibility: 40 %.
+        assert!((ratio - 1.0).abs() < 0.03, "{pixel:?}, not {expected}");
+    }
 }
 
 #[test]

@@ -213,7 +213,8 @@ vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, Li
     // Before the lights: afterwards the albedos would take registers while shadow rays are traced.
     vec3 around = s.emissive * under_coat(s);
     if ((AMBIENT || REFLECTION) && !ENVIRONMENT_APART) around += environment_light(s, albedo);
-    if (!all_around || s.unlit) around = all_around ? s.base : vec3(0.0);
+    if (s.unlit) around = s.base;
+    if (!all_around) around = vec3(0.0);
     vec3 result = with_lights(around, layers_of(s, albedo), pixel, surface, tiles_across, range);
     return s.unlit ? around : result;
 }

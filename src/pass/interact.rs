@@ -14,7 +14,6 @@ use super::ray_trees::RayTrees;
 use crate::gpu::{Frame, Image};
 use crate::plan::{FEWER_AT_HITS, Rays};
 use crate::shader::interact;
-use crate::upload::environment::directions_of_pixels;
 
 /// Adds reflected and refracted light at the surfaces of the G-buffer to `radiance`. With a part, only light of the
 /// part is added: all rays are traced once more, over the same tiles. With `trees`, in steps.
@@ -43,7 +42,7 @@ pub fn interact<'a>(
     library.lighting.light_budget = library.loops.loop_budget;
     library.gbuffer.stored_triangles = true;
     library.emitters.light_samples = library.emitters.light_samples.div_ceil(FEWER_AT_HITS);
-    library.ambient_occlusion.first_direction = directions_of_pixels(lighting.plan);
+    library.ambient_occlusion.first_direction = lighting.plan.occlusion_rays_of_pattern();
     library.ambient_occlusion.occlusion_rays = lighting.plan.occlusion_rays_at_hits();
     library.lighting.environment_apart = lighting.plan.occlusion_rays() > 0;
     library.ray_tree.first_event = part.map_or(0, |part| part as u32);

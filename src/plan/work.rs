@@ -220,6 +220,23 @@ impl Plan {
         self.occlusion_rays().div_ceil(FEWER_AT_HITS)
     }
 
+    /// Side of the square of pixels that have different directions of ambient occlusion. With enough directions in a
+    /// pixel none stands out, and the cut of many more takes its time.
+    #[must_use]
+    pub fn occlusion_pattern(&self) -> u32 {
+        match self.occlusion_rays() * self.samples {
+            1..=256 => 4,
+            257..=1024 => 2,
+            _ => 1,
+        }
+    }
+
+    /// Directions of ambient occlusion for one sample of all primary surfaces in that square.
+    #[must_use]
+    pub fn occlusion_rays_of_pattern(&self) -> u32 {
+        self.occlusion_rays() * self.occlusion_pattern().pow(2)
+    }
+
     /// Ray marching through grids of σ.
     #[must_use]
     pub fn march(&self) -> March {

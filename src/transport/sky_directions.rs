@@ -99,7 +99,7 @@ fn cut(mut pieces: Vec<Piece>, count: usize, from_left: bool) -> Vec<Piece> {
     }
     let variance: DVec3 = pieces.iter().map(|piece| (piece.direction - middle).powf(2.0) * piece.measure).sum();
     let axis = variance.max_position();
-    // Their places are sorted, and pieces moved once: in half of the time.
+    // Pieces are large: their places are sorted.
     let mut places: Vec<(f64, u32)> = (0..).zip(&pieces).map(|(i, piece)| (piece.direction[axis], i)).collect();
     places.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     pieces = places.into_iter().map(|(_, i)| pieces[i as usize]).collect();

@@ -264,21 +264,6 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
     Some(folder.join(format!("environment-{map}-{maker}-{width}x{height}")))
 }
 
-/// Side of the square of pixels that have different directions of ambient occlusion. With enough directions in a pixel
-/// none stands out, and the cut of many more takes its time.
-pub fn pattern_side(plan: &Plan) -> u32 {
-    match plan.occlusion_rays() * plan.samples {
-        1..=256 => 4,
-        257..=1024 => 2,
-        _ => 1,
-    }
-}
-
-/// Directions of a sample for primary surfaces, of all pixels of the pattern.
-pub fn directions_of_pixels(plan: &Plan) -> u32 {
-    plan.occlusion_rays() * pattern_side(plan).pow(2)
-}
-
 /// The directions of ambient occlusion. For each sample: those of primary surfaces, a list for each pixel of the
 /// pattern; then those of surfaces that rays meet, of a coarser cut.
 fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
@@ -286,7 +271,7 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
         return Buffer::new(device, NOTHING, 0, Place::Device);
     };
     let [primary, hit] = [plan.occlusion_rays(), plan.occlusion_rays_at_hits()];
-    let pixels = pattern_side(plan).pow(2);
+    let pixels = plan.occlusion_pattern().pow(2);
     // Each pixel of the pattern has a cut of its own, about axes of its own.
     let sphere = Sphere::new(sky);
     let cut = |rays: u32, pixel: u32| {
@@ -294,18 +279,16 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
     };
     let of_pixels: Vec<_> = (0..pixels).into_par_iter().map(|pixel| cut(primary, pixel)).collect();
     let of_hits = cut(hit, 0);
-    let of_sample = |cut: &[_], rays: u32, sample: u32| cut[(sample * rays) as usize..][..rays as usize].to_vec();
-    let directions: Vec<SkyDirection> = (0..plan.samples)
-        .flat_map(|sample| {
-            let of_pixels = of_pixels.iter().map(move |cut| (cut, primary));
-            of_pixels.chain([(&of_hits, hit)]).flat_map(move |(cut, rays)| of_sample(cut, rays, sample))
-        })
-        .map(|at| SkyDirection {
-            direction: at.direction.as_vec3().to_array(),
-            weight: at.weight.map(|w| w as f32),
-            solid_angle: at.solid_angle as f32,
-        })
-        .collect();
+    let mut directions = Vec::new();
+    for sample in 0..plan.samples as usize {
+        for (rays, cut) in of_pixels.iter().map(|cut| (primary, cut)).chain([(hit, &of_hits)]) {
+            directions.extend(cut.chunks(rays as usize).nth(sample).into_iter().flatten().map(|at| SkyDirection {
+                direction: at.direction.as_vec3().to_array(),
+                weight: at.weight.map(|w| w as f32),
+                solid_angle: at.solid_angle as f32,
+            }));
+        }
+    }
     Buffer::with_data(device, "sky directions", &directions)
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 
-use super::environment::{EnvironmentOnDevice, directions_of_pixels};
+use super::environment::EnvironmentOnDevice;
 use super::rays::RaysOnDevice;
 use super::scene::SceneOnDevice;
 use crate::gpu::{BoundSet, Buffer, DescriptorSet, Device, Resource, Sampled};
@@ -121,9 +121,9 @@ impl<'a> OnDevice<'a> {
             },
             ambient_occlusion: lib::ambient_occlusion::Constants {
                 occlusion_rays: with.occlusion,
-                sample_directions: directions_of_pixels(plan) + plan.occlusion_rays_at_hits(),
+                sample_directions: plan.occlusion_rays_of_pattern() + plan.occlusion_rays_at_hits(),
                 first_direction: 0,
-                pattern_side: super::environment::pattern_side(plan),
+                pattern_side: plan.occlusion_pattern(),
                 // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
                 lobe_rays: if plan.screen.mirrors { 0 } else { with.occlusion.div_ceil(4) },
             },

@@ -104,8 +104,7 @@ fn parts_of_lobe(cos_v: f64, roughness: f64) -> [LobeSums; 2] {
             let masking = 2.0 * cos_v / (cos_v + root(cos_v));
             let masking_shadowing = 2.0 * l.z * cos_v / (cos_v * root(l.z) + l.z * root(cos_v));
             let weight = masking_shadowing / masking;
-            let left = 1.0 - v_h;
-            let grazing = left * left * (left * left) * left;
+            let grazing = (1.0 - v_h).powi(5);
             for (part, share) in parts.iter_mut().zip([1.0 - grazing, grazing]) {
                 part.weight += weight * share;
                 part.direction += l * (weight * share);

@@ -48,7 +48,7 @@ const ONE: u32 = 0x31;
 const TWO: u32 = 0x32;
 
 /// What a command draws, RGB.
-fn drawn(folder: &Path, command: &str) -> ([u32; 2], Vec<[u8; 3]>) {
+fn drawn(folder: &Path, command: &str) -> Shown {
     let words: Vec<&str> = command.split_whitespace().skip(1).collect();
     program::etalon(folder, &words, &[]).succeeded();
     let picture = image::open(folder.join("picture.png")).expect("a picture").to_rgb8();
@@ -56,10 +56,18 @@ fn drawn(folder: &Path, command: &str) -> ([u32; 2], Vec<[u8; 3]>) {
     (size, picture.pixels().map(|p| p.0).collect())
 }
 
-/// Waits until the window shows what its own command draws. The command is copied again where the picture does not
-/// follow: keys of before may still be on their way to a slow window.
+/// A picture's size and texels.
+type Shown = ([u32; 2], Vec<[u8; 3]>);
+
+/// Waits until the window shows what its own command draws; `is_shown` is asked of the window and of that picture.
+/// Returns the command and the picture. The command is copied again where the window does not follow: the scene is
+/// still read, panels find their size, or keys of before are on their way to a slow window.
 #[track_caller]
-fn shows_its_command(viewer: &mut Viewer<'_>, folder: &Path) -> String {
+fn until_shown(
+    viewer: &mut Viewer<'_>,
+    folder: &Path,
+    is_shown: impl Fn(&Shown, &Shown) -> bool,
+) -> (String, Vec<[u8; 3]>) {
     // A wheel is smoothed over some pictures.
     std::thread::sleep(Duration::from_secs(1));
     viewer.until("a picture that the copied command draws", |viewer| {
@@ -67,23 +75,28 @@ fn shows_its_command(viewer: &mut Viewer<'_>, folder: &Path) -> String {
         let command = viewer.line();
         assert!(command.starts_with("etalon render "), "{command}");
         viewer.key(ESCAPE, None);
-        let (size, expected) = drawn(folder, &command);
-        let is_shown = || {
-            let (window, pixels) = viewer.pixels()?;
-            // A narrow window keeps the sides of what a camera of the file shows: the picture is in its middle.
-            let above = (window[1].saturating_sub(size[1]) / 2 * window[0]) as usize;
-            let other = pixels.iter().skip(above).zip(&expected).filter(|(a, b)| a != b).count();
-            (window[0] == size[0] && window[1] >= size[1] && other == 0).then_some(())
-        };
+        let expected = drawn(folder, &command);
         let soon = (0..200).any(|_| {
             std::thread::sleep(Duration::from_millis(30));
-            is_shown().is_some()
+            viewer.pixels().is_some_and(|window| is_shown(&window, &expected))
         });
         if !soon {
             eprintln!("not shown yet: `{command}`");
         }
-        soon.then_some(command)
+        soon.then_some((command, expected.1))
     })
+}
+
+/// Waits for a window that is all picture; returns the command.
+#[track_caller]
+fn shows_its_command(viewer: &mut Viewer<'_>, folder: &Path) -> String {
+    let is_all = |(window, pixels): &Shown, (size, expected): &Shown| {
+        // A narrow window keeps the sides of what a camera of the file shows: the picture is in its middle.
+        let above = (window[1].saturating_sub(size[1]) / 2 * window[0]) as usize;
+        let other = pixels.iter().skip(above).zip(expected).filter(|(a, b)| a != b).count();
+        window[0] == size[0] && window[1] >= size[1] && other == 0
+    };
+    until_shown(viewer, folder, is_all).0
 }
 
 const OBJ: &str = "mtllib two.mtl\nv -1 0 0\nv 1 0 0\nv 0 1.5 0\nv 0 0 -1\nusemtl red\nf 1 2 3\nf 2 4 3\nf 4 1 3\n";
@@ -446,37 +459,19 @@ fn two_triangles(folder: &Path) -> PathBuf {
     b.save_glb(folder)
 }
 
-/// Waits until the window, beside its panels, shows what its own command draws; returns the command and the picture.
+/// Waits for a picture beside panels; returns the command and the picture.
 #[track_caller]
 fn shows_beside_panels(viewer: &mut Viewer<'_>, folder: &Path) -> (String, Vec<[u8; 3]>) {
-    std::thread::sleep(Duration::from_secs(1));
-    // The command changes when the scene has been read, and while the panels find their size.
-    viewer.until("a picture that the copied command draws", |viewer| {
-        viewer.key(C, None);
-        let command = viewer.line();
-        let (size, expected) = drawn(folder, &command);
-        viewer.key(ESCAPE, None);
-        let is_shown = || {
-            let (window, pixels) = viewer.pixels()?;
-            // It begins at the left, below the bar.
-            let rows = window[1].checked_sub(size[1])?;
-            let row = |y: u32, width: u32, of: &[[u8; 3]]| {
-                let from = (y * width) as usize;
-                of[from..from + size[0] as usize].to_vec()
-            };
-            let is_at =
-                |above: &u32| (0..size[1]).all(|y| row(above + y, window[0], &pixels) == row(y, size[0], &expected));
-            (0..=rows).find(is_at)
+    let is_beside = |(window, pixels): &Shown, (size, expected): &Shown| {
+        let row = |y: u32, width: u32, of: &[[u8; 3]]| {
+            let from = (y * width) as usize;
+            of[from..from + size[0] as usize].to_vec()
         };
-        let soon = (0..200).any(|_| {
-            std::thread::sleep(Duration::from_millis(30));
-            is_shown().is_some()
-        });
-        if !soon {
-            eprintln!("not shown yet: `{command}`");
-        }
-        soon.then_some((command, expected))
-    })
+        let is_at = |above: u32| (0..size[1]).all(|y| row(above + y, window[0], pixels) == row(y, size[0], expected));
+        // It begins at the left, below the bar.
+        window[1].checked_sub(size[1]).is_some_and(|rows| (0..=rows).any(is_at))
+    };
+    until_shown(viewer, folder, is_beside)
 }
 
 /// Copies the command until it is as expected: a scene that is read again takes its time.
