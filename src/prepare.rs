@@ -18,7 +18,7 @@ use crate::scene::{AmbientLight, Bounds, Light, LightKind, Prune, Scene};
 use crate::transport::bvh::Bvh;
 use crate::transport::contact::{has_coincident_interfaces, twins};
 use crate::transport::emitters::{Emitters, Sky};
-use crate::transport::occluders::mean_albedo;
+use crate::transport::occluders::OccluderRadiosity;
 
 /// Conditions under which a scene is prepared.
 #[derive(Debug, Clone, Copy)]
@@ -96,7 +96,7 @@ impl Original {
     /// # Errors
     /// When the scene has nothing to draw.
     pub fn plan(&self, conditions: &Conditions<'_>) -> Result<Plan> {
-        planned(&mut self.scene.clone(), conditions).map(|(plan, _)| plan)
+        planned(&mut self.scene.clone(), conditions).map(|(plan, ..)| plan)
     }
 }
 
@@ -128,8 +128,8 @@ pub struct Hierarchy {
     pub offset: f64,
     /// Whether some closed dielectric mesh touches another surface (coincident interfaces).
     pub touching: bool,
-    /// Albedo of what surfaces face ([`mean_albedo`]); black without rays of ambient occlusion.
-    pub occluder_albedo: [f64; 3],
+    /// Of what surfaces face; zero without rays of ambient occlusion.
+    pub occluder_radiosity: OccluderRadiosity,
     /// Warnings about the triangles, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -143,8 +143,14 @@ pub fn ray_offset(extent: f64) -> f64 {
     OFFSET_ROUNDINGS * extent * 2.0_f64.powi(-24)
 }
 
+/// Ray offset in metres of a tree's triangles.
+fn offset_of(bvh: &Bvh) -> f64 {
+    let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
+    ray_offset(extent.into())
+}
+
 /// Canonicalises a scene and plans it.
-fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Solids)> {
+fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Facts, Surroundings)> {
     let &Conditions { knobs, forced, sky, background, blurred } = conditions;
     one_medium_each(scene);
     let triangles = scene.triangles();
@@ -171,10 +177,11 @@ fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Soli
         grey: sky.is_some_and(|sky| Environment::is_grey(sky.map)),
         sky: background,
         blurred,
+        faced: true,
         forced,
     };
     let plan = Plan::new(scene, &facts, surroundings, knobs);
-    Ok((plan, facts.solids))
+    Ok((plan, facts, surroundings))
 }
 
 /// Adds a black directional and a black point light: placeholders for forced effects that need lights.
@@ -194,7 +201,8 @@ impl Prepared {
     pub fn new(original: impl Into<Original>, conditions: &Conditions<'_>) -> Result<Self> {
         let original = original.into();
         let mut scene = original.scene.clone();
-        let (mut plan, solids) = planned(&mut scene, conditions)?;
+        let (mut plan, facts, surroundings) = planned(&mut scene, conditions)?;
+        let canonical = scene.clone();
         // Lights that contribute nothing take no loop iteration.
         let mut kept = plan.lights.iter();
         scene.lights.retain(|_| kept.next().copied().unwrap_or_default());
@@ -202,9 +210,21 @@ impl Prepared {
         // Those that other models than path tracing sample come last, where their loops do not reach.
         let sampled = |light: &Light| plan.paths.is_none() && plan.light_samples.take(light);
         scene.lights.sort_by_key(|light| (!matches!(light.kind, LightKind::Directional { .. }), sampled(light)));
+        let LightSamples { emitting, shaped, .. } = plan.light_samples;
+        let mut occluder_radiosity = OccluderRadiosity::ZERO;
+        if plan.occlusion_rays() > 0 {
+            let (bvh, _) = original.tree_of(|| &scene)?;
+            let lamps = Emitters::of(&scene, None, emitting);
+            occluder_radiosity =
+                OccluderRadiosity::of(&scene, &facts.solids, &bvh, &lamps, conditions.sky, offset_of(&bvh));
+            // Without an environment rays would only look for the light of surfaces that have none.
+            if conditions.sky.is_none() && occluder_radiosity.is_zero() {
+                plan = Plan::new(&canonical, &facts, Surroundings { faced: false, ..surroundings }, conditions.knobs);
+            }
+        }
+        let solids = facts.solids;
         let refracts = plan.screen.refraction || plan.rays.is_some_and(|rays| rays.refraction);
         let mut warnings = if refracts { solids.warnings.clone() } else { Vec::new() };
-        let LightSamples { emitting, shaped, .. } = plan.light_samples;
         let emitters = match plan.paths {
             Some(_) => Emitters::of(&scene, conditions.sky, emitting),
             None => Emitters::with_extent(&scene, shaped, emitting),
@@ -214,7 +234,10 @@ impl Prepared {
             plan.light_samples.count = 0;
         }
         let hierarchy = match plan.rays {
-            Some(rays) => Some(Hierarchy::of(&scene, original.tree_of(|| &scene)?, &solids, rays)),
+            Some(rays) => {
+                let tree = original.tree_of(|| &scene)?;
+                Some(Hierarchy { occluder_radiosity, ..Hierarchy::of(&scene, tree, &solids, rays) })
+            }
             None => None,
         };
         if let Some(hierarchy) = &hierarchy {
@@ -244,14 +267,10 @@ impl Prepared {
 
 impl Hierarchy {
     fn of(scene: &Scene, (bvh, build_ms): Tree, solids: &Solids, rays: Rays) -> Self {
-        let extent = bvh.triangles.iter().flat_map(|t| t.corners.iter().flatten()).fold(0.0_f32, |m, x| m.max(x.abs()));
-        let offset = ray_offset(extent.into());
+        let offset = offset_of(&bvh);
         let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.body, offset);
-        let occluder_albedo = match rays.occlusion {
-            0 => [0.0; 3],
-            _ => mean_albedo(scene, solids, &bvh, offset),
-        };
-        Self { build_ms, offset, touching, occluder_albedo, warnings: odd_triangles(scene, &bvh, solids), bvh }
+        let occluder_radiosity = OccluderRadiosity::ZERO;
+        Self { build_ms, offset, touching, occluder_radiosity, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }
 

@@ -6,14 +6,13 @@
 //    in all pixels, what occludes throws a faint hard shadow for each direction.
 // 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
 //    radiance (split sum).
-// 3. Interreflection. What occludes the share O of the directions is taken to face this surface, and to have the same share
-//    occluded by this surface, as inside a concavity. Half of it is taken to have this surface's albedo ρ, as parts of one
-//    object, and half the mean of what the scene's surfaces face (src/transport/occluders.rs). With ρ' the mean of both,
-//    E = V E₀ + ρ' O E' and E' = (1 − O) E₀' + ρ O E.
+// 3. Interreflection. What occludes sends the light of lamps and of the environment: a radiosity B that the host has found for
+//    the whole scene, by place and direction (src/transport/occluders.rs). With O the share that is occluded,
+//    E = V E₀ + O B.
 // 4. Light from behind, which a surface transmits diffusely. What occludes its back is taken to be of the same material, as
 //    the other walls of a lampshade: it lets E₀ through, by its albedo τ of diffuse transmission, and gives back what
 //    arrives there. E = V E₀ + (1 − V)(τ E₀ + ρ E).
-// Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Stewart and Langer 1997 (concavities); Keller and
+// Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Goral et al. 1984 (radiosity); Keller and
 // Heidrich 2001 (interleaved sampling).
 // Assumes: bvh space, metres; a surface whose `lobe` is known.
 #ifndef AMBIENT_OCCLUSION_GLSL
@@ -40,13 +39,14 @@ const uint COAT_LOBE_EVENT = 0x401u;
 struct SkyShown {
     vec3 seen;               // light that arrives
     vec3 all;                // and without occluders
-    vec3 occluded;           // by cosine and solid angle
-    vec3 occluded_direction; // sum of the occluded directions
+    vec3 occluded;         // by cosine and solid angle
+    vec3 occluded_along;   // sums over the occluded directions of their squared components: the positive ones,
+    vec3 occluded_against; // and the negative ones
     float hemisphere;
     vec3 seen_behind; // on the other side, where the surface transmits diffusely
     vec3 all_behind;
 };
-const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0, vec3(0.0), vec3(0.0));
+const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0, vec3(0.0), vec3(0.0));
 
 // One of the directions, as a surface has it.
 struct SkyRay {
@@ -96,7 +96,11 @@ void show(inout SkyShown shown, SkyRay r, vec3 visible) {
     // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
     vec3 hidden = 1.0 - visible;
     shown.occluded += projected * hidden;
-    shown.occluded_direction += r.sky.direction * (projected * mean(hidden));
+    float occluded = projected * mean(hidden);
+    vec3 along = max(r.sky.direction, 0.0);
+    vec3 against = min(r.sky.direction, 0.0);
+    shown.occluded_along += along * along * occluded;
+    shown.occluded_against += against * against * occluded;
 }
 
 // Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass
@@ -127,14 +131,18 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
-// Irradiance of a surface and of what occludes it, in this order or the other: of each the irradiance that arrives, `here`
-// and `there`, and the share of the other's, q `received` and q' `given`. E = E₁ + q E' and E' = E₂ + q' E, so
-// E = (E₁ + q E₂)/(1 − q q'). Here and below every step is precise: a driver's compiler turns x (1 − a) + y a into an
-// interpolation of its own, in one of two ways, by what else stands in the program.
-vec3 exchanged_irradiance(vec3 here, vec3 there, vec3 received, vec3 given) {
-    precise vec3 kept = 1.0 - received * given;
-    precise vec3 both = here + there * received;
-    return both / kept;
+// Radiosity of what a surface at p faces, on average over the directions that are occluded. Here and below every step is
+// precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two ways, by what else
+// stands in the program.
+vec3 occluder_radiosity(vec3 p, SkyShown shown) {
+    precise float occluded = mean(shown.occluded);
+    precise vec3 by_share = trace_terms.occluder_radiosity.by_share * (occluded / max(shown.hemisphere, 1e-30));
+    precise vec3 by_place = trace_terms.occluder_radiosity.by_place * p;
+    precise vec3 along = trace_terms.occluder_radiosity.along * shown.occluded_along;
+    precise vec3 against = trace_terms.occluder_radiosity.against * shown.occluded_against;
+    precise vec3 by_direction = along + against;
+    precise vec3 radiosity = by_place + by_share + by_direction / max(occluded, 1e-30);
+    return light_of_rgb(max(radiosity, 0.0));
 }
 
 // The radiance in a lobe of which the share `visible` sees the environment.
@@ -156,26 +164,17 @@ struct OccludedLight {
 };
 
 OccludedLight occluded_light(Surface s, EnvironmentFactors factors, SkyShown shown) {
-    precise vec3 kept = min(factors.albedo, 0.98);
     precise vec3 occluded_share = shown.occluded / max(shown.hemisphere, 1e-30);
     precise vec3 here = environment_irradiance(s.n) * share_of(shown.seen, shown.all);
-    // What occludes faces this surface, and is taken to be as open.
-    float size2 = dot(shown.occluded_direction, shown.occluded_direction);
-    precise vec3 there = environment_irradiance(size2 > 0.0 ? -shown.occluded_direction * inversesqrt(size2) : s.n) * (1.0 - occluded_share);
-    // In a band of wavelengths the mean, of red, green and blue, is of no use.
-    precise vec3 of_others = SPECTRAL ? kept : min(0.5 * (kept + trace_terms.occluder_albedo), 0.98);
-    precise vec3 given = kept * occluded_share;
-    precise vec3 received = of_others * occluded_share;
+    vec3 radiosity = occluder_radiosity(s.p_bvh, shown);
+    precise vec3 irradiance = here + occluded_share * radiosity;
     if (DIFFUSE_TRANSMISSION) {
         vec3 open = share_of(shown.seen_behind, shown.all_behind);
         precise vec3 shut = 1.0 - open;
         precise vec3 arriving = open + shut * s.diffuse_through;
         factors.through *= arriving / (1.0 - shut * min(s.diffuse, 0.98));
     }
-    OccludedLight r;
-    r.diffuse = diffuse_environment_light(factors, exchanged_irradiance(here, there, received, given));
-    r.beside = of_others * exchanged_irradiance(there, here, given, received) * INV_PI;
-    return r;
+    return OccludedLight(diffuse_environment_light(factors, irradiance), radiosity * INV_PI);
 }
 
 // All that needs the layers is evaluated before rays are traced, and light is summed as soon as it is known: what is kept until later

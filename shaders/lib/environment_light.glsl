@@ -15,15 +15,11 @@ struct EnvironmentFactors {
     vec3 base_lobe;
     float coat_lobe;
     vec3 through; // the radiance to the eye of light from behind, without visibility
-    vec3 albedo;  // of all below the coat
 };
 
 EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
     vec3 scattered = scattered_per_irradiance(s, albedo.base);
-    // Precise for the sake of ambient occlusion (exchanged_irradiance).
-    precise vec3 diffuse = scattered * PI;
-    precise vec3 all = diffuse + albedo.base.base;
-    EnvironmentFactors f = EnvironmentFactors(vec3(0.0), vec3(0.0), 0.0, vec3(0.0), all);
+    EnvironmentFactors f = EnvironmentFactors(vec3(0.0), vec3(0.0), 0.0, vec3(0.0));
     float left = s.occlusion;
     if (CLEARCOAT) {
         left *= albedo.under_coat;

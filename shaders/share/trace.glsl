@@ -3,6 +3,15 @@
 // camera. p_bvh = p_rel + bvh_from_rel.
 #ifndef SHARE_TRACE_GLSL
 #define SHARE_TRACE_GLSL
+// Of what the scene's surfaces face, in W/m²: an ambient cube, whose sides count by the squares of the direction's components,
+// with a slope by the place in bvh space.
+struct OccluderRadiosity {
+    mat3 along;    // columns: seen along an axis
+    mat3 against;  // and in the opposite direction
+    mat3 by_place; // slopes in W/m³
+    vec3 by_share; // slope by the share that is occluded
+};
+
 struct TraceTerms {
     vec3 bvh_from_rel;
     float offset;         // distance in metres by which rays start off a surface (lib/trace.glsl, ray_origin)
@@ -17,6 +26,6 @@ struct TraceTerms {
     uint sample_index;
     uint interfaces;      // greatest number of surfaces that a path may meet
     uint first_emitter;   // texel of the first emitter, behind the triangles of the BVH (lib/emitters.glsl)
-    vec3 occluder_albedo; // of what surfaces of the scene face, on average (lib/ambient_occlusion.glsl)
+    OccluderRadiosity occluder_radiosity;
 };
 #endif

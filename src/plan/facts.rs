@@ -38,6 +38,8 @@ pub struct Surroundings {
     pub sky: bool,
     /// Whether it is blurred there.
     pub blurred: bool,
+    /// Whether surfaces send light to other surfaces; true where it is not known.
+    pub faced: bool,
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,
 }
@@ -50,6 +52,7 @@ impl Surroundings {
         grey: false,
         sky: false,
         blurred: false,
+        faced: true,
         forced: ForcedEffects::None,
     };
 }

@@ -217,14 +217,21 @@ impl Planner<'_> {
     }
 
     fn mirror_images(&mut self, transmission: &Transmission) -> MirrorImages {
-        let Self { surfaces, decisions, knobs, surroundings, .. } = self;
+        let Self { scene, surfaces, decisions, knobs, surroundings, bounds, .. } = self;
         let paths = self.paths;
         let there_is = surroundings.environment;
         let cause = Cause::when(there_is, "there is an environment", "there is no environment");
         let environment = decisions.decide(EffectId::Environment, cause);
-        let shown = |called_for: bool, against: &str| match there_is {
-            true => Cause::when(called_for, "there is an environment", against),
-            false => Cause::against("there is no environment"),
+        // Without an environment rays of ambient occlusion find surfaces that lamps light.
+        let rays = knobs.indirect.occlusion_rays();
+        let lamps = scene.lights.iter().any(|light| shines_on(light, *bounds))
+            || (knobs.lights != rungs::Lights::Points && surfaces.any(is_emitter));
+        let by_surfaces = !there_is && rays > 0 && lamps && surroundings.faced;
+        let shown = |called_for: bool, against: &str| match (there_is, by_surfaces, lamps && rays > 0) {
+            (true, ..) => Cause::when(called_for, "there is an environment", against),
+            (_, true, _) => Cause::when(called_for, "lamps light surfaces that others face", against),
+            (.., true) => Cause::against("there is no environment, and no surface sends light of lamps to another one"),
+            _ => Cause::against("there is no environment"),
         };
         let rung = knobs.reflection;
         let shiny = surfaces.any(|m| !m.unlit && (mirrors(m) || m.clearcoat > 0.0));
@@ -274,11 +281,10 @@ impl Planner<'_> {
         let cause = shown(surfaces.any(scatters), "no visible material scatters light");
         let by_rung = knobs.indirect.choice().allows(knobs.indirect != Indirect::Off);
         let ambient = decisions.decide_with(EffectId::AmbientLight, unless_paths(paths, by_rung), cause);
-        let cause = shown(ambient || reflection, "no surface is lit by an environment");
-        let rays = knobs.indirect.occlusion_rays();
+        let cause = shown(ambient || reflection, "no surface is lit from all around");
         let by_rung = knobs.indirect.choice().allows(rays > 0);
         let occluded = decisions.decide_with(EffectId::AmbientOcclusion, unless_paths(paths, by_rung), cause);
-        let environment = environment || reflection || ambient;
+        let environment = environment || (!by_surfaces && (reflection || ambient));
         let occlusion = if occluded { rays } else { 0 };
         MirrorImages {
             environment,

@@ -204,6 +204,40 @@ fn mean_of(image: &Image) -> f64 {
     decoded.sum::<f64>() / total.max(1) as f64
 }
 
+/// The corners of a triangle of an instance, in world space.
+fn corners(scene: &Scene, instance: &Instance, primitive: usize) -> [DVec3; 3] {
+    let mesh = &scene.meshes[instance.mesh];
+    [0, 1, 2].map(|k| {
+        let p = mesh.positions[mesh.indices[3 * primitive + k] as usize];
+        instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3())
+    })
+}
+
+/// A triangle of a scene.
+pub(super) struct SceneTriangle {
+    pub(super) instance: usize,
+    /// Index of the triangle in its mesh.
+    pub(super) primitive: usize,
+    /// In world space.
+    pub(super) corners: [DVec3; 3],
+    /// Unit normal of the front.
+    pub(super) front: DVec3,
+}
+
+impl SceneTriangle {
+    /// The triangle with this index among all of the scene, whose instances begin at `firsts`.
+    pub(super) fn of(scene: &Scene, firsts: &[u32], index: u32) -> Self {
+        let instance = firsts.partition_point(|&first| first <= index) - 1;
+        let placed = &scene.instances[instance];
+        let primitive = (index - firsts[instance]) as usize;
+        let corners = corners(scene, placed, primitive);
+        let [a, b, c] = corners;
+        let mirrored = placed.world_from_object.matrix3.determinant() < 0.0;
+        let n = (b - a).cross(c - a).normalize_or_zero();
+        Self { instance, primitive, corners, front: if mirrored { -n } else { n } }
+    }
+}
+
 /// The triangles whose emission factor is above `above`, with their power.
 fn triangles(scene: &Scene, above: f64) -> Vec<(EmitterSource, f64)> {
     use std::f64::consts::PI;
@@ -225,10 +259,7 @@ fn triangles(scene: &Scene, above: f64) -> Vec<(EmitterSource, f64)> {
         let count = mesh.indices.len() / 3;
         if radiance[mesh.material] > 0.0 {
             for i in 0..count {
-                let [a, b, c] = [0, 1, 2].map(|k| {
-                    let p = mesh.positions[mesh.indices[3 * i + k] as usize];
-                    instance.world_from_object.transform_point3(glam::Vec3::from(p).as_dvec3())
-                });
+                let [a, b, c] = corners(scene, instance, i);
                 let area = 0.5 * (b - a).cross(c - a).length();
                 let two_sided = material.double_sided;
                 if area > 0.0 && area.is_finite() {

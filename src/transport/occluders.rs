@@ -1,161 +1,412 @@
-//! The mean albedo of what the surfaces of a scene face, which ambient occlusion takes for that of half of what
-//! occludes.
+//! The radiosity of what the surfaces of a scene face: the light that occluders send in place of what they hide.
 //!
-//! Read docs/decisions/ambient-occlusion.md. The mean is over all surfaces by their areas and over directions by the
-//! cosine, as light arrives from diffuse surfaces; it is the same for every device, traversal and camera.
+//! Read Goral, Torrance, Greenberg and Battaile 1984 (radiosity); pbrt (4th ed.), chapter 13 (path tracing);
+//! docs/decisions/ambient-occlusion.md. Paths start on surfaces, by area and cosine as light arrives there, and take all
+//! surfaces to be diffuse. What the first ray meets sends the radiosity B, from lamps and from the environment, over any
+//! number of surfaces. An ambient cube (McTaggart 2004, "Half-Life 2 / Valve Source Shading") with slopes by place and by
+//! the occluded share is fitted to B by least squares. It is the same for every device, traversal and camera.
 
-use glam::DVec3;
+use std::array::from_fn;
+use std::f64::consts::{PI, TAU};
+
+use glam::{DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::bvh::{Bvh, Triangle};
-use super::line::{self, Crossing};
+use super::emitters::{EmitterSource, Emitters, SceneTriangle, Sky};
+use super::line;
+use super::sky_directions::{SkyDirection, Sphere};
+use super::surface_point::SurfacePoint;
 use crate::optics::SplitMix64;
+use crate::optics::light::{point_falloff, spot_share};
 use crate::scene::lobe::DIFFUSE_TRANSMISSION;
 use crate::scene::solid::Solids;
-use crate::scene::{AlphaMode, Material, Scene};
+use crate::scene::{AlphaMode, Extent, Light, LightKind, Material, Scene};
 
-/// Number of rays. Where all meet something, the mean of their albedos has a standard error of at most
-/// 0.5 / √2048 = 0.011.
-const RAYS: usize = 2048;
+/// Number of points, and of paths from each.
+const POINTS: usize = 2048;
+const PATHS: usize = 8;
+/// Light samples where a path's first ray ends, of the environment and of lamps each; one at later surfaces.
+const FIRST_SAMPLES: u32 = 4;
+/// Directions of the environment.
+const SKY_DIRECTIONS: u32 = 256;
+/// Surfaces of a path after which Russian roulette may end it.
+const SURE_SURFACES: u32 = 3;
+/// Surfaces that a ray passes at most.
+const MOST_PASSED: u32 = 32;
+/// Coefficients: the mean, what the cube's six sides have beside it, the slopes by place and by the occluded share.
+const TERMS: usize = 11;
+/// The ridge of the least squares, in parts of the number of rays and in rays: few rays give a constant.
+const RIDGE: [f64; 2] = [0.02, 10.0];
 
-/// Casts rays from points all over the scene; `offset` is where they start, in metres from the surface. Black where no
-/// surface faces another one.
-#[must_use]
-pub fn mean_albedo(scene: &Scene, solids: &Solids, bvh: &Bvh, offset: f64) -> [f64; 3] {
-    let mut area = 0.0;
-    let areas: Vec<f64> = bvh
-        .triangles
-        .iter()
-        .map(|triangle| {
-            area += edges(triangle)[0].cross(edges(triangle)[1]).length();
-            area
-        })
-        .collect();
-    let found: Vec<Option<(DVec3, f64)>> = (0..RAYS)
-        .into_par_iter()
-        .map(|i| {
-            let at = (i as f64 + 0.5) / RAYS as f64 * area;
-            let triangle = bvh.triangles.get(areas.partition_point(|&up_to| up_to <= at))?;
-            let mut random = SplitMix64::new(i as u64);
-            let (origin, direction) = ray_from(scene, solids, triangle, &mut random);
-            let hit = line::nearest(bvh, origin, direction, offset)?;
-            Some(occluder(scene, &hit))
-        })
-        .collect();
-    let (sum, weight) = found
-        .into_iter()
-        .flatten()
-        .fold((DVec3::ZERO, 0.0), |(sum, weight), (albedo, share)| (sum + albedo * share, weight + share));
-    if weight > 0.0 { (sum / weight).to_array() } else { [0.0; 3] }
+/// The radiosity of occluders in W/m², red, green and blue: an ambient cube with slopes. Zero where no surface faces
+/// another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OccluderRadiosity {
+    /// What rays along +x, +y and +z meet, at the origin of bvh space.
+    pub along: DMat3,
+    /// What rays along −x, −y and −z meet.
+    pub against: DMat3,
+    /// The slopes along the axes of bvh space, in W/m³.
+    pub by_place: DMat3,
+    /// The slope by the share of what a surface has around it that is occluded.
+    pub by_share: DVec3,
 }
 
-/// The edges from the first corner.
-fn edges(triangle: &Triangle) -> [DVec3; 2] {
-    let [a, b, c] = triangle.corners.map(|corner| DVec3::from(corner.map(f64::from)));
-    [b - a, c - a]
-}
+impl OccluderRadiosity {
+    /// That of black surfaces.
+    pub const ZERO: Self =
+        Self { along: DMat3::ZERO, against: DMat3::ZERO, by_place: DMat3::ZERO, by_share: DVec3::ZERO };
 
-/// A ray from a uniform point of the triangle's front, with the density cos θ / π.
-fn ray_from(scene: &Scene, solids: &Solids, triangle: &Triangle, random: &mut SplitMix64) -> (DVec3, DVec3) {
-    let ([mut u, mut v], [ab, ac]) = ([random.unit(), random.unit()], edges(triangle));
-    if u + v > 1.0 {
-        (u, v) = (1.0 - u, 1.0 - v);
+    /// Follows paths from all over the scene, whose lights are `emitters` and `sky`; `offset` is where rays start, in
+    /// metres from the surface.
+    #[must_use]
+    pub fn of(
+        scene: &Scene,
+        solids: &Solids,
+        bvh: &Bvh,
+        emitters: &Emitters,
+        sky: Option<Sky<'_>>,
+        offset: f64,
+    ) -> Self {
+        let intensity = sky.map_or(0.0, |sky| f64::from(sky.intensity));
+        let mut sky = sky.map_or_else(Vec::new, |sky| Sphere::new(sky).directions(SKY_DIRECTIONS, 0));
+        sky.iter_mut().for_each(|at| at.weight = at.weight.map(|weight| weight * intensity));
+        let first_triangles = scene.first_triangles();
+        let lit = LitScene { scene, solids, bvh, emitters, sky, offset, first_triangles };
+        let mut area = 0.0;
+        let areas: Vec<f64> = bvh
+            .triangles
+            .iter()
+            .map(|triangle| {
+                let [_, ab, ac] = edges(triangle);
+                area += ab.cross(ac).length();
+                area
+            })
+            .collect();
+        let found: Vec<Vec<Sent>> = (0..POINTS)
+            .into_par_iter()
+            .filter_map(|i| {
+                let at = (i as f64 + 0.5) / POINTS as f64 * area;
+                Some(lit.arriving(bvh.triangles.get(areas.partition_point(|&up_to| up_to <= at))?, i))
+            })
+            .collect();
+        Self::fitted(&found.concat())
     }
-    let outwards = line::winds_outwards(scene, solids, triangle.instance as usize);
-    let n = ab.cross(ac).normalize_or_zero() * if outwards { 1.0 } else { -1.0 };
-    // A uniform point of the sphere around the tip of n.
-    let (z, phi) = (random.between(-1.0, 1.0), random.between(0.0, std::f64::consts::TAU));
-    let around = (1.0 - z * z).sqrt();
-    let direction = n + DVec3::new(around * phi.cos(), around * phi.sin(), z);
-    (DVec3::from(triangle.corners[0].map(f64::from)) + ab * u + ac * v, direction.normalize_or(n))
+
+    /// Whether no surface sends light to another one.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        *self == Self::ZERO
+    }
+
+    /// The radiosity of what occludes the share `occluded` of what a surface at `place` in bvh space has around it;
+    /// `along` and `against` are the means of the squared positive and negative components of those directions.
+    #[must_use]
+    pub fn at(&self, place: DVec3, [along, against]: [DVec3; 2], occluded: f64) -> DVec3 {
+        let by_direction = self.along * along + self.against * against;
+        (self.by_place * place + by_direction + self.by_share * occluded).max(DVec3::ZERO)
+    }
+
+    /// The ridge regression: (FᵀF + ridge) β = FᵀB for the features F of all rays. The mean has no ridge. Places count
+    /// in units of the largest one.
+    fn fitted(sent: &[Sent]) -> Self {
+        let unit = sent.iter().map(|ray| ray.from.length()).fold(f64::MIN_POSITIVE, f64::max);
+        let mut rows = [[0.0; TERMS + 3]; TERMS];
+        for ray in sent {
+            let ([along, against], p, b) = (squares(ray.direction), ray.from / unit, ray.radiosity.to_array());
+            let features =
+                [1.0, along.x, along.y, along.z, against.x, against.y, against.z, p.x, p.y, p.z, ray.occluded - 0.5];
+            for (row, feature) in rows.iter_mut().zip(features) {
+                let products = features.into_iter().chain(b);
+                row.iter_mut().zip(products).for_each(|(sum, product)| *sum += feature * product);
+            }
+        }
+        if sent.is_empty() {
+            return Self::ZERO;
+        }
+        for (i, row) in rows.iter_mut().enumerate().skip(1) {
+            row[i] += RIDGE[0] * sent.len() as f64 + RIDGE[1];
+        }
+        // Elimination (Gauss and Jordan) without pivots: the matrix is symmetric and positive definite.
+        for i in 0..TERMS {
+            let pivot = rows[i].map(|x| x / rows[i][i]);
+            rows[i] = pivot;
+            for (_, row) in rows.iter_mut().enumerate().filter(|(k, _)| *k != i) {
+                let factor = row[i];
+                row.iter_mut().zip(pivot).for_each(|(x, of_pivot)| *x -= factor * of_pivot);
+            }
+        }
+        let [mean, ax, ay, az, bx, by, bz, px, py, pz, by_share] = rows.map(|row| DVec3::from_slice(&row[TERMS..]));
+        let mean = mean - by_share * 0.5;
+        Self {
+            by_share,
+            along: DMat3::from_cols(mean + ax, mean + ay, mean + az),
+            against: DMat3::from_cols(mean + bx, mean + by, mean + bz),
+            by_place: DMat3::from_cols(px, py, pz) * unit.recip(),
+        }
+    }
 }
 
-/// The albedo of what a ray meets, and how far it occludes.
-fn occluder(scene: &Scene, hit: &Crossing<'_>) -> (DVec3, f64) {
-    let m = hit.point().material(scene);
+/// The squares of a direction's positive and of its negative components. They sum to 1.
+#[must_use]
+pub fn squares(direction: DVec3) -> [DVec3; 2] {
+    [direction.max(DVec3::ZERO), direction.min(DVec3::ZERO)].map(|part| part * part)
+}
+
+/// What arrives along the first ray of a path.
+#[derive(Clone)]
+struct Sent {
+    /// Where the ray starts, in bvh space.
+    from: DVec3,
+    direction: DVec3,
+    /// Of what the ray meets, in W/m².
+    radiosity: DVec3,
+    /// The share of all rays from there that meet something.
+    occluded: f64,
+}
+
+/// A point that a ray meets.
+struct Met {
+    at: DVec3,
+    /// Unit geometric normal on the ray's side.
+    normal: DVec3,
+    material: Material,
+}
+
+/// What paths meet and what lights it.
+struct LitScene<'a> {
+    scene: &'a Scene,
+    solids: &'a Solids,
+    bvh: &'a Bvh,
+    emitters: &'a Emitters,
+    sky: Vec<SkyDirection>,
+    offset: f64,
+    first_triangles: Vec<u32>,
+}
+
+impl LitScene<'_> {
+    /// What arrives at point `number`, which lies on the triangle. Places and directions are those of R sequences
+    /// (Roberts 2018).
+    fn arriving(&self, triangle: &Triangle, number: usize) -> Vec<Sent> {
+        // The root of x³ = x + 1.
+        const STEP: f64 = 1.324_717_957_244_746;
+        let sequence = |i: usize| [1, 2].map(|power| (0.5 + (i as f64 + 1.0) * STEP.powi(-power)).fract());
+        let mut random = SplitMix64::new(number as u64);
+        let instance = triangle.instance as usize;
+        let [a, ab, ac] = edges(triangle);
+        let mesh = &self.scene.meshes[self.scene.instances[instance].mesh];
+        let two_sided = self.scene.materials[mesh.material].double_sided && !self.solids.solid[instance];
+        let outwards = line::winds_outwards(self.scene, self.solids, instance);
+        let front = outwards != (two_sided && random.unit() < 0.5);
+        let n = ab.cross(ac).normalize_or_zero() * if front { 1.0 } else { -1.0 };
+        let [u, v] = sequence(number);
+        let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+        let from = a + ab * u + ac * v;
+        let turn = [random.unit(), random.unit()];
+        let mut sent: Vec<Sent> = (0..PATHS)
+            .filter_map(|i| {
+                let numbers = sequence(i);
+                let direction = by_cosine(n, (numbers[0] + turn[0]).fract(), (numbers[1] + turn[1]).fract());
+                let met = self.meet(from, direction, &mut random)?;
+                Some(Sent { from, direction, radiosity: self.radiosity(met, &mut random), occluded: 0.0 })
+            })
+            .collect();
+        let occluded = sent.len() as f64 / PATHS as f64;
+        sent.iter_mut().for_each(|sent| sent.occluded = occluded);
+        sent
+    }
+
+    /// The first surface along a ray that does not let it through, as far as it lets through at random.
+    fn meet(&self, mut origin: DVec3, direction: DVec3, random: &mut SplitMix64) -> Option<Met> {
+        for _ in 0..MOST_PASSED {
+            let hit = line::nearest(self.bvh, origin, direction, self.offset)?;
+            origin += direction * hit.t;
+            let material = hit.point().material(self.scene);
+            if random.unit() < stops(&material) {
+                let [_, ab, ac] = edges(hit.triangle);
+                let n = ab.cross(ac).normalize_or_zero();
+                return Some(Met { at: origin, normal: if n.dot(direction) > 0.0 { -n } else { n }, material });
+            }
+        }
+        None
+    }
+
+    /// The radiosity of a point on the side of its normal, by a path of diffuse reflections and transmissions.
+    fn radiosity(&self, first: Met, random: &mut SplitMix64) -> DVec3 {
+        let (mut met, mut weight, mut sum) = (first, DVec3::ONE, DVec3::ZERO);
+        for surfaces in 1.. {
+            let m = &met.material;
+            if m.unlit {
+                return sum + weight * rgb(m.base_color) * PI;
+            }
+            let [reflected, transmitted] = albedos(m);
+            let mut n = met.normal;
+            // Which of both, by their shares.
+            let through = transmitted.element_sum() / (reflected + transmitted).element_sum().max(f64::MIN_POSITIVE);
+            weight *= if random.unit() < through {
+                n = -n;
+                transmitted / through
+            } else {
+                reflected / (1.0 - through)
+            };
+            let samples = if surfaces == 1 { FIRST_SAMPLES } else { 1 };
+            for _ in 0..samples {
+                let arriving = self.light_of_sky(met.at, n, random) + self.light_of_lamps(met.at, n, random);
+                sum += weight * arriving / f64::from(samples);
+            }
+            let goes_on = if surfaces < SURE_SURFACES { 1.0 } else { weight.max_element().min(0.95) };
+            if random.unit() >= goes_on {
+                break;
+            }
+            weight /= goes_on;
+            let direction = by_cosine(n, random.unit(), random.unit());
+            match self.meet(met.at, direction, random) {
+                Some(next) => met = next,
+                None => break,
+            }
+        }
+        sum
+    }
+
+    /// The share of light that passes from `origin` along a unit direction.
+    fn visibility(&self, origin: DVec3, direction: DVec3, distance: f64) -> f64 {
+        let mut passing = 1.0;
+        line::traverse(self.bvh, origin, direction, self.offset, |hit| {
+            if hit.t < distance {
+                let instance = &self.scene.instances[hit.triangle.instance as usize];
+                let m = &self.scene.materials[self.scene.meshes[instance.mesh].material];
+                let opaque = m.alpha_mode == AlphaMode::Opaque && m.transmission == 0.0;
+                passing *= if opaque { 0.0 } else { 1.0 - stops(&hit.point().material(self.scene)) };
+            }
+            if passing > 0.0 { distance } else { 0.0 }
+        });
+        passing
+    }
+
+    /// Irradiance from the environment, by one of its directions.
+    fn light_of_sky(&self, at: DVec3, n: DVec3, random: &mut SplitMix64) -> DVec3 {
+        let Some(sky) = self.sky.get((random.unit() * self.sky.len() as f64) as usize) else { return DVec3::ZERO };
+        match sky.direction.dot(n) {
+            cos if cos > 0.0 => DVec3::from(sky.weight) * (cos * self.visibility(at, sky.direction, f64::INFINITY)),
+            _ => DVec3::ZERO,
+        }
+    }
+
+    /// Irradiance from lamps, by one of them.
+    fn light_of_lamps(&self, at: DVec3, n: DVec3, random: &mut SplitMix64) -> DVec3 {
+        let word = (random.bits() >> 32) as u32;
+        let list = &self.emitters.list;
+        let Some(emitter) = list.partition_point(|emitter| emitter.first <= word).checked_sub(1).map(|i| list[i])
+        else {
+            return DVec3::ZERO;
+        };
+        let (to_light, arriving) = match emitter.source {
+            EmitterSource::Environment => return DVec3::ZERO,
+            EmitterSource::Punctual(i) => {
+                self.light_of_lamp(&self.scene.lights[i as usize], at + self.bvh.anchor, random)
+            }
+            EmitterSource::Triangle { index, area, two_sided } => {
+                let SceneTriangle { instance, primitive, corners, front } =
+                    SceneTriangle::of(self.scene, &self.first_triangles, index);
+                let [a, b, c] = corners.map(|corner| corner - self.bvh.anchor);
+                let (ab, ac, root) = (b - a, c - a, random.unit().sqrt());
+                let v = root * random.unit();
+                let uv = [root - v, v];
+                let to_light = a + ab * uv[0] + ac * uv[1] - at;
+                let cos = -front.dot(to_light.normalize_or_zero());
+                let cos = if two_sided { cos.abs() } else { cos.max(0.0) };
+                let radiance = SurfacePoint { instance, primitive, uv }.material(self.scene).emissive;
+                // No triangle is seen at more than a hemisphere: beside a near one the estimate is bounded.
+                let solid_angle = (cos * area * point_falloff(to_light.length_squared(), 0.0)).min(TAU);
+                (to_light, rgb(radiance) * solid_angle)
+            }
+        };
+        let l = to_light.normalize_or_zero();
+        let cos = l.dot(n);
+        if cos <= 0.0 || arriving == DVec3::ZERO {
+            return DVec3::ZERO;
+        }
+        // A directional light has no place, only a direction.
+        let directional = matches!(emitter.source, EmitterSource::Punctual(i)
+            if matches!(self.scene.lights[i as usize].kind, LightKind::Directional { .. }));
+        let distance = if directional { f64::INFINITY } else { to_light.length() - self.offset };
+        arriving * (cos / emitter.probability * self.visibility(at, l, distance))
+    }
+
+    /// The way to a point of a light, and the irradiance from there of a surface that faces it.
+    fn light_of_lamp(&self, light: &Light, at: DVec3, random: &mut SplitMix64) -> (DVec3, DVec3) {
+        let color = rgb(light.color);
+        let falloff = |to_light: DVec3, range: Option<f64>| {
+            point_falloff(to_light.length_squared(), range.map_or(0.0, |range| (range * range).recip()))
+        };
+        match light.kind {
+            LightKind::Directional { direction } => (-direction, color),
+            // A sphere has the irradiance of its middle, as far as nothing hides a part of it.
+            LightKind::Point { position, range } => {
+                let to_light = position - at;
+                (to_light, color * falloff(to_light, range))
+            }
+            LightKind::Spot { position, direction, range, inner, outer } => {
+                let (x, y) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+                let aside = match light.extent {
+                    Some(Extent::Rectangle { across, half_height }) => {
+                        across * x + direction.cross(across).normalize_or_zero() * (half_height * y)
+                    }
+                    Some(Extent::Disk { radius } | Extent::Sphere { radius }) => {
+                        let (across, up) = direction.any_orthonormal_pair();
+                        let (sin, cos) = (PI * y).sin_cos();
+                        (across * cos + up * sin) * (radius * x.abs().sqrt())
+                    }
+                    None => DVec3::ZERO,
+                };
+                let to_light = position + aside - at;
+                let cos = -direction.dot(to_light.normalize_or_zero());
+                let scale = (inner.cos() - outer.cos()).max(1e-7).recip();
+                let share = match light.extent {
+                    Some(_) => cos.max(0.0),
+                    None => spot_share(cos, scale, -outer.cos() * scale),
+                };
+                (to_light, color * (share * falloff(to_light, range)))
+            }
+        }
+    }
+}
+
+/// The first corner, and the edges from there.
+fn edges(triangle: &Triangle) -> [DVec3; 3] {
+    let [a, b, c] = triangle.corners.map(|corner| Vec3::from(corner).as_dvec3());
+    [a, b - a, c - a]
+}
+
+/// A direction around `n` with the density cos θ / π, of two numbers in [0, 1): `n` and a uniform point of the sphere
+/// around its tip.
+fn by_cosine(n: DVec3, z: f64, around: f64) -> DVec3 {
+    let z = 2.0 * z - 1.0;
+    let (sin, cos) = (TAU * around).sin_cos();
+    let radius = (1.0 - z * z).sqrt();
+    (n + DVec3::new(radius * cos, radius * sin, z)).normalize_or(n)
+}
+
+fn rgb<const N: usize>(of: [f32; N]) -> DVec3 {
+    DVec3::from(from_fn::<_, 3, _>(|i| f64::from(of[i])))
+}
+
+/// The share of light that a surface does not let straight through.
+fn stops(m: &Material) -> f64 {
     let alpha = f64::from(m.base_color[3]);
     let covers = match m.alpha_mode {
         AlphaMode::Opaque => 1.0,
         AlphaMode::Mask(cutoff) => f64::from(u8::from(alpha >= f64::from(cutoff))),
         AlphaMode::Blend => alpha,
     };
-    (albedo(&m), covers * (1.0 - passing(&m)))
+    covers * (1.0 - f64::from(m.transmission * (1.0 - m.metallic)))
 }
 
-/// The share of light that passes a material straight on.
-fn passing(m: &Material) -> f64 {
-    f64::from(m.transmission * (1.0 - m.metallic))
-}
-
-/// The share of light that a material gives back: metals their base colour, other materials theirs without what they
-/// transmit diffusely. The few percent of a dielectric's own mirror are left out.
-fn albedo(m: &Material) -> DVec3 {
-    let [r, g, b, _] = m.base_color.map(f64::from);
-    let through = f64::from(m.lobes[DIFFUSE_TRANSMISSION].factors[0] * (1.0 - m.metallic));
-    DVec3::new(r, g, b) * (1.0 - through)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::solid::solids;
-    use crate::scene::{Instance, Mesh};
-    use glam::{DAffine3, DMat3};
-
-    /// Squares of 2 m with these albedos at z = 0, 1, …; the fronts of odd ones face down, by a mirrored instance.
-    fn squares(materials: Vec<Material>) -> Scene {
-        let mesh = |material| Mesh {
-            positions: vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]].into(),
-            normals: vec![[0.0, 0.0, 1.0]; 4].into(),
-            indices: vec![0, 1, 2, 0, 2, 3].into(),
-            material,
-            ..Mesh::default()
-        };
-        let instance = |mesh: usize| Instance {
-            name: String::new(),
-            mesh,
-            world_from_object: DAffine3 {
-                matrix3: DMat3::from_diagonal(DVec3::new(1.0, 1.0, if mesh % 2 == 1 { -1.0 } else { 1.0 })),
-                translation: DVec3::Z * mesh as f64,
-            },
-        };
-        let all = 0..materials.len();
-        Scene {
-            meshes: all.clone().map(mesh).collect(),
-            instances: all.map(instance).collect(),
-            materials,
-            ..Scene::default()
-        }
-    }
-
-    fn mean(materials: Vec<Material>) -> [f64; 3] {
-        let scene = squares(materials);
-        mean_albedo(&scene, &solids(&scene), &Bvh::build(&scene).expect("a tree"), 1e-6)
-    }
-
-    fn painted(r: f32, g: f32, b: f32) -> Material {
-        Material { base_color: [r, g, b, 1.0], metallic: 0.0, ..Material::default() }
-    }
-
-    #[test]
-    fn equal_surfaces_face_each_other_equally() {
-        let both = mean(vec![painted(0.9, 0.1, 0.5), painted(0.1, 0.3, 0.5)]);
-        for (found, wanted) in both.into_iter().zip([0.5, 0.2, 0.5]) {
-            // Four standard errors of a mean of some 400 rays that meet the other square.
-            assert!((found - wanted).abs() < 4.0 * 0.4 / 20.0, "{both:?}");
-        }
-        assert!((both[2] - 0.5).abs() < 1e-6, "{both:?}");
-    }
-
-    #[test]
-    fn what_lets_light_through_counts_for_less() {
-        let mut leaf = painted(0.8, 0.8, 0.8);
-        leaf.lobes[DIFFUSE_TRANSMISSION].factors = [0.5, 1.0, 1.0, 1.0];
-        let glass = Material { transmission: 1.0, ..painted(1.0, 1.0, 1.0) };
-        let leaves = mean(vec![leaf.clone(), leaf]);
-        assert!(leaves.iter().all(|albedo| (albedo - 0.4).abs() < 1e-6), "{leaves:?}");
-        assert_eq!(mean(vec![painted(0.7, 0.7, 0.7), glass])[0], f64::from(0.7_f32));
-        // Nothing faces a square alone.
-        assert_eq!(mean(vec![painted(0.7, 0.7, 0.7)]), [0.0; 3]);
-    }
+/// The shares of light that a material gives back and transmits diffusely: metals give back their base colour. The few
+/// percent of a dielectric's own mirror are left out.
+fn albedos(m: &Material) -> [DVec3; 2] {
+    let [share, color @ ..] = m.lobes[DIFFUSE_TRANSMISSION].factors;
+    let through = f64::from(share * (1.0 - m.metallic));
+    [rgb(m.base_color) * (1.0 - through), rgb(color) * through]
 }

@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::emitters::{Emitter, EmitterSource, Emitters};
+use super::emitters::{Emitter, EmitterSource, Emitters, SceneTriangle};
 use super::layers::{Layer, Layers, Media, coverage};
 pub use super::layers::{SMOOTHEST, is_smooth};
 use super::line::{self, Crossing};
@@ -149,19 +149,11 @@ impl PhotonWorld<'_> {
                 Some(Beam { origin, direction: -towards, media: Media::default() })
             }
             EmitterSource::Triangle { index, two_sided, .. } => {
-                let instance = self.firsts.partition_point(|&first| first <= index) - 1;
-                let placed = &self.scene.instances[instance];
-                let mesh = &self.scene.meshes[placed.mesh];
-                let first = 3 * (index - self.firsts[instance]) as usize;
-                let [a, b, c] = [0, 1, 2].map(|k| {
-                    let p = glam::Vec3::from(mesh.positions[mesh.indices[first + k] as usize]).as_dvec3();
-                    placed.world_from_object.transform_point3(p) - self.bvh.anchor
-                });
+                let SceneTriangle { instance, corners, front, .. } = SceneTriangle::of(self.scene, &self.firsts, index);
+                let [a, b, c] = corners.map(|corner| corner - self.bvh.anchor);
                 let (x, y) = (random.unit().sqrt(), random.unit());
-                let n = (b - a).cross(c - a).normalize();
-                let mirrored = placed.world_from_object.matrix3.determinant() < 0.0;
-                let back = (two_sided && random.unit() < 0.5) != mirrored;
-                let direction = random.above(if back { -n } else { n });
+                let back = two_sided && random.unit() < 0.5;
+                let direction = random.above(if back { -front } else { front });
                 let origin = a + (b - a) * (x * (1.0 - y)) + (c - a) * (x * y);
                 Some(Beam { origin, direction, media: self.media[instance].clone() })
             }

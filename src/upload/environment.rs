@@ -267,9 +267,12 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
 /// The directions of ambient occlusion. For each sample: those of primary surfaces, a list for each pixel of the
 /// pattern; then those of surfaces that rays meet, of a coarser cut.
 fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
-    let Some(sky) = sky.filter(|_| plan.occlusion_rays() > 0) else {
+    if plan.occlusion_rays() == 0 {
         return Buffer::new(device, NOTHING, 0, Place::Device);
-    };
+    }
+    // Without an environment rays look for surfaces, in equal solid angles.
+    let black = Environment::constant([0.0; 3]);
+    let sky = sky.unwrap_or(Sky { map: &black, intensity: 1.0, rotation: 0.0 });
     let [primary, hit] = [plan.occlusion_rays(), plan.occlusion_rays_at_hits()];
     let pixels = plan.occlusion_pattern().pow(2);
     // Each pixel of the pattern has a cut of its own, about axes of its own.

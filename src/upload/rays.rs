@@ -142,7 +142,7 @@ impl RaysOnDevice {
         let Some((rays, hierarchy)) = plan.rays.zip(prepared.hierarchy.as_ref()) else {
             return Self::none(device, scene);
         };
-        let &Hierarchy { ref bvh, build_ms, offset, touching, occluder_albedo, .. } = hierarchy;
+        let &Hierarchy { ref bvh, build_ms, offset, touching, occluder_radiosity, .. } = hierarchy;
         let start = std::time::Instant::now();
         // The traversal: with a short stack on GPUs, where its trail is long enough; 16-bit boxes where these are
         // precise enough.
@@ -233,7 +233,12 @@ impl RaysOnDevice {
             grid_unit: grid.unit,
             nodes: sentinel as u32,
             interfaces: rays.interfaces,
-            occluder_albedo: occluder_albedo.map(|albedo| albedo as f32),
+            occluder_radiosity: share::OccluderRadiosity {
+                along: occluder_radiosity.along.as_mat3().to_cols_array_2d(),
+                against: occluder_radiosity.against.as_mat3().to_cols_array_2d(),
+                by_place: occluder_radiosity.by_place.as_mat3().to_cols_array_2d(),
+                by_share: occluder_radiosity.by_share.as_vec3().to_array(),
+            },
             first_emitter: emitters_on_device.first,
             ..bytemuck::Zeroable::zeroed()
         };

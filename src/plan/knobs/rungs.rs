@@ -39,9 +39,9 @@ effects! {
     Reflection = "reflection":
         "a surface or clear coat that is smooth enough for the rung of `lobes`" => "by rays: the BVH, tile lists, the ray tree; in screen space: a copy of the picture, passes",
     AmbientLight = "ambient light":
-        "an environment, and a surface with a diffuse part" => "code",
+        "an environment, or rays of ambient occlusion and lamps; and a surface with a diffuse part" => "code",
     AmbientOcclusion = "ambient occlusion":
-        "the environment's light on a surface, with `indirect=occlusion:N`" => "the BVH, a pass",
+        "light from all around, of an environment or of surfaces in the light of lamps, with `indirect=occlusion:N`" => "the BVH, a pass",
     PunctualLights = "punctual lights":
         "a light that shines and reaches a surface that it lights" => "the light table; code",
     Shadows = "shadows":
@@ -378,7 +378,11 @@ knob! {
 
 macro_rules! occlusion_about {
     ($rays:literal) => {
-        concat!("Light of the environment where ", $rays, " rays find no surface in its way; surfaces light no others.")
+        concat!(
+            "Light of the environment where ",
+            $rays,
+            " rays find no surface in its way, and of surfaces where they do: a mean."
+        )
     };
 }
 
@@ -401,7 +405,7 @@ knob! {
     exact: Path,
     lecture: ["R6"],
     effects: [PathTracing, AmbientLight, AmbientOcclusion],
-    about: "indirect light: none, ambient light without visibility, ambient light with N rays of ambient occlusion, path tracing",
+    about: "indirect light: none, ambient light without visibility, ambient light with N rays of ambient occlusion and the mean light of what they meet, path tracing",
 }
 
 impl Indirect {
