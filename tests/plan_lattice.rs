@@ -608,7 +608,6 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
 /// Effects that are only kept where another one is, and so where those are that it needs.
 const NEEDS: &[(&str, &str)] = &[
     ("absorption", "transmissive hits"),
-    ("ambient light", "environment"),
     // Every scene here has a surface that scatters.
     ("ambient occlusion", "ambient light"),
     ("anisotropy", "textures of lobes"),
@@ -617,7 +616,7 @@ const NEEDS: &[(&str, &str)] = &[
     ("heterogeneous media", "absorption"),
     ("heterogeneous media", "refraction"),
     ("emissive surfaces as lights", "emissive textures"),
-    ("environment reflection", "environment"),
+    ("prefiltered environment", "environment"),
     ("prefiltered environment", "environment reflection"),
     ("quadrature", "heterogeneous media"),
     ("shadows", "punctual lights"),

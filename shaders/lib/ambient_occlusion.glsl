@@ -96,11 +96,15 @@ void show(inout SkyShown shown, SkyRay r, vec3 visible) {
     // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
     vec3 hidden = 1.0 - visible;
     shown.occluded += projected * hidden;
-    float occluded = projected * mean(hidden);
+    precise float occluded = projected * mean(hidden);
     vec3 along = max(r.sky.direction, 0.0);
     vec3 against = min(r.sky.direction, 0.0);
-    shown.occluded_along += along * along * occluded;
-    shown.occluded_against += against * against * occluded;
+    precise vec3 along2 = along * along;
+    precise vec3 against2 = against * against;
+    precise vec3 more_along = along2 * occluded;
+    precise vec3 more_against = against2 * occluded;
+    shown.occluded_along += more_along;
+    shown.occluded_against += more_against;
 }
 
 // Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass
@@ -131,17 +135,27 @@ vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
     return all > 0.0 ? seen / all : vec3(1.0);
 }
 
+// m v: a matrix product is not precise, whatever holds its result.
+vec3 by_axes(mat3 m, vec3 v) {
+    precise vec3 x = m[0] * v[0];
+    precise vec3 y = m[1] * v[1];
+    precise vec3 z = m[2] * v[2];
+    precise vec3 sum = x + y + z;
+    return sum;
+}
+
 // Radiosity of what a surface at p faces, on average over the directions that are occluded. Here and below every step is
 // precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two ways, by what else
 // stands in the program.
 vec3 occluder_radiosity(vec3 p, SkyShown shown) {
     precise float occluded = mean(shown.occluded);
     precise vec3 by_share = trace_terms.occluder_radiosity.by_share * (occluded / max(shown.hemisphere, 1e-30));
-    precise vec3 by_place = trace_terms.occluder_radiosity.by_place * p;
-    precise vec3 along = trace_terms.occluder_radiosity.along * shown.occluded_along;
-    precise vec3 against = trace_terms.occluder_radiosity.against * shown.occluded_against;
+    precise vec3 by_place = by_axes(trace_terms.occluder_radiosity.by_place, p);
+    precise vec3 along = by_axes(trace_terms.occluder_radiosity.along, shown.occluded_along);
+    precise vec3 against = by_axes(trace_terms.occluder_radiosity.against, shown.occluded_against);
     precise vec3 by_direction = along + against;
-    precise vec3 radiosity = by_place + by_share + by_direction / max(occluded, 1e-30);
+    precise vec3 mean_by_direction = by_direction / max(occluded, 1e-30);
+    precise vec3 radiosity = by_place + by_share + mean_by_direction;
     return light_of_rgb(max(radiosity, 0.0));
 }
 

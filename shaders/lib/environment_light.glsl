@@ -18,14 +18,15 @@ struct EnvironmentFactors {
 };
 
 EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
-    vec3 scattered = scattered_per_irradiance(s, albedo.base);
+    precise vec3 scattered = scattered_per_irradiance(s, albedo.base);
     EnvironmentFactors f = EnvironmentFactors(vec3(0.0), vec3(0.0), 0.0, vec3(0.0));
     float left = s.occlusion;
     if (CLEARCOAT) {
         left *= albedo.under_coat;
         if (REFLECTION && !s.coat_traced) f.coat_lobe = albedo.coat * s.occlusion;
     }
-    if (AMBIENT) f.scattered = scattered * left;
+    precise vec3 scattered_here = scattered * left;
+    if (AMBIENT) f.scattered = scattered_here;
     if (AMBIENT && DIFFUSE_TRANSMISSION) f.through = transmitted_per_irradiance(s, albedo.base) * environment_irradiance(-s.n) * left;
     if (REFLECTION && !s.base_traced) f.base_lobe = albedo.base.base * left;
     return f;
@@ -33,7 +34,7 @@ EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
 
 // Light on the diffuse base layer and on the lobes of extensions.
 vec3 diffuse_environment_light(EnvironmentFactors f, vec3 irradiance) {
-    vec3 result = vec3(0.0);
+    precise vec3 result = vec3(0.0);
     if (AMBIENT) result += f.scattered * irradiance;
     if (AMBIENT && DIFFUSE_TRANSMISSION) result += f.through;
     return result;
