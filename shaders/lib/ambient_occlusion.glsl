@@ -9,9 +9,7 @@
 // 3. Interreflection. What occludes sends the light of lamps and of the environment: a radiosity B that the host has found for
 //    the whole scene, by place and direction (src/transport/occluders.rs). With O the share that is occluded,
 //    E = V E₀ + O B.
-// 4. Light from behind, which a surface transmits diffusely. What occludes its back is taken to be of the same material, as
-//    the other walls of a lampshade: it lets E₀ through, by its albedo τ of diffuse transmission, and gives back what
-//    arrives there. E = V E₀ + (1 − V)(τ E₀ + ρ E).
+// 4. Light from behind, which a surface transmits diffusely, in the same way.
 // Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Goral et al. 1984 (radiosity); Keller and
 // Heidrich 2001 (interleaved sampling).
 // Assumes: bvh space, metres; a surface whose `lobe` is known.
@@ -144,19 +142,33 @@ vec3 by_axes(mat3 m, vec3 v) {
     return sum;
 }
 
-// Radiosity of what a surface at p faces, on average over the directions that are occluded. Here and below every step is
-// precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two ways, by what else
-// stands in the program.
-vec3 occluder_radiosity(vec3 p, SkyShown shown) {
-    precise float occluded = mean(shown.occluded);
-    precise vec3 by_share = trace_terms.occluder_radiosity.by_share * (occluded / max(shown.hemisphere, 1e-30));
+// Radiosity of what occludes the share `share` of what a surface at p has around it: `along` and `against` are the means of the
+// squared positive and negative components of those directions. Here and below every step is precise: a driver's compiler turns
+// x (1 − a) + y a into an interpolation of its own, in one of two ways, by what else stands in the program.
+vec3 occluder_radiosity(vec3 p, vec3 along, vec3 against, float share) {
+    precise vec3 by_share = trace_terms.occluder_radiosity.by_share * share;
     precise vec3 by_place = by_axes(trace_terms.occluder_radiosity.by_place, p);
-    precise vec3 along = by_axes(trace_terms.occluder_radiosity.along, shown.occluded_along);
-    precise vec3 against = by_axes(trace_terms.occluder_radiosity.against, shown.occluded_against);
-    precise vec3 by_direction = along + against;
-    precise vec3 mean_by_direction = by_direction / max(occluded, 1e-30);
-    precise vec3 radiosity = by_place + by_share + mean_by_direction;
+    precise vec3 by_along = by_axes(trace_terms.occluder_radiosity.along, along);
+    precise vec3 by_against = by_axes(trace_terms.occluder_radiosity.against, against);
+    precise vec3 radiosity = by_place + by_share + by_along + by_against;
     return light_of_rgb(max(radiosity, 0.0));
+}
+
+vec3 radiosity_in_front(Surface s, SkyShown shown) {
+    precise float occluded = mean(shown.occluded);
+    precise float share = occluded / max(shown.hemisphere, 1e-30);
+    precise vec3 along = shown.occluded_along / max(occluded, 1e-30);
+    precise vec3 against = shown.occluded_against / max(occluded, 1e-30);
+    return occluder_radiosity(s.p_bvh, along, against, share);
+}
+
+// All directions around −n are taken to be occluded evenly: by the cosine their squares are (1 + n²)/4 for each axis, of which
+// about (1 − n)/2 are of positive components.
+vec3 radiosity_behind(Surface s, vec3 shut) {
+    precise vec3 squares = (1.0 + s.n * s.n) * 0.125;
+    precise vec3 along = squares * (1.0 - s.n);
+    precise vec3 against = squares * (1.0 + s.n);
+    return occluder_radiosity(s.p_bvh, along, against, mean(shut));
 }
 
 // The radiance in a lobe of which the share `visible` sees the environment.
@@ -180,15 +192,15 @@ struct OccludedLight {
 OccludedLight occluded_light(Surface s, EnvironmentFactors factors, SkyShown shown) {
     precise vec3 occluded_share = shown.occluded / max(shown.hemisphere, 1e-30);
     precise vec3 here = environment_irradiance(s.n) * share_of(shown.seen, shown.all);
-    vec3 radiosity = occluder_radiosity(s.p_bvh, shown);
+    vec3 radiosity = radiosity_in_front(s, shown);
     precise vec3 irradiance = here + occluded_share * radiosity;
+    precise vec3 behind = vec3(0.0);
     if (DIFFUSE_TRANSMISSION) {
         vec3 open = share_of(shown.seen_behind, shown.all_behind);
         precise vec3 shut = 1.0 - open;
-        precise vec3 arriving = open + shut * s.diffuse_through;
-        factors.through *= arriving / (1.0 - shut * min(s.diffuse, 0.98));
+        behind = environment_irradiance(-s.n) * open + shut * radiosity_behind(s, shut);
     }
-    return OccludedLight(diffuse_environment_light(factors, irradiance), radiosity * INV_PI);
+    return OccludedLight(diffuse_environment_light(factors, irradiance, behind), radiosity * INV_PI);
 }
 
 // All that needs the layers is evaluated before rays are traced, and light is summed as soon as it is known: what is kept until later

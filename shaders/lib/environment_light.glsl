@@ -14,7 +14,7 @@ struct EnvironmentFactors {
     vec3 scattered;
     vec3 base_lobe;
     float coat_lobe;
-    vec3 through; // the radiance to the eye of light from behind, without visibility
+    vec3 through; // radiance to the eye per irradiance from behind
 };
 
 EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
@@ -27,16 +27,16 @@ EnvironmentFactors environment_factors(Surface s, LayerAlbedo albedo) {
     }
     precise vec3 scattered_here = scattered * left;
     if (AMBIENT) f.scattered = scattered_here;
-    if (AMBIENT && DIFFUSE_TRANSMISSION) f.through = transmitted_per_irradiance(s, albedo.base) * environment_irradiance(-s.n) * left;
+    if (AMBIENT && DIFFUSE_TRANSMISSION) f.through = transmitted_per_irradiance(s, albedo.base) * left;
     if (REFLECTION && !s.base_traced) f.base_lobe = albedo.base.base * left;
     return f;
 }
 
-// Light on the diffuse base layer and on the lobes of extensions.
-vec3 diffuse_environment_light(EnvironmentFactors f, vec3 irradiance) {
+// Light on the diffuse base layer and on the lobes of extensions, from the viewer's side and from behind.
+vec3 diffuse_environment_light(EnvironmentFactors f, vec3 irradiance, vec3 behind) {
     precise vec3 result = vec3(0.0);
     if (AMBIENT) result += f.scattered * irradiance;
-    if (AMBIENT && DIFFUSE_TRANSMISSION) result += f.through;
+    if (AMBIENT && DIFFUSE_TRANSMISSION) result += f.through * behind;
     return result;
 }
 
@@ -79,7 +79,9 @@ vec3 radiance_in_coat_lobe(Surface s) {
 // Without visibility: the irradiance, and the prefiltered map in the mean directions of the lobes.
 vec3 environment_light(Surface s, LayerAlbedo albedo) {
     EnvironmentFactors factors = environment_factors(s, albedo);
-    vec3 result = diffuse_environment_light(factors, AMBIENT ? environment_irradiance(s.n) : vec3(0.0));
+    vec3 irradiance = AMBIENT ? environment_irradiance(s.n) : vec3(0.0);
+    vec3 behind = AMBIENT && DIFFUSE_TRANSMISSION ? environment_irradiance(-s.n) : vec3(0.0);
+    vec3 result = diffuse_environment_light(factors, irradiance, behind);
     if (REFLECTION && !s.base_traced) result += factors.base_lobe * radiance_in_base_lobe(s);
     if (CLEARCOAT && REFLECTION && !s.coat_traced) result += factors.coat_lobe * radiance_in_coat_lobe(s);
     return result;
