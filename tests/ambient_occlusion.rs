@@ -248,7 +248,7 @@ fn without_an_environment_and_lamps_the_plan_has_none() {
     let alone = prepared(&lit, None, &["indirect=occlusion:16"]).plan;
     let decided = alone.effects.iter().find(|effect| effect.id == EffectId::AmbientOcclusion).expect("a decision");
     assert!(
-        alone.occlusion_rays() == 0 && decided.cause.contains("no surface sends light of lamps"),
+        alone.occlusion_rays() == 0 && decided.cause.contains("no surface sends light to another one"),
         "{}",
         decided.cause
     );

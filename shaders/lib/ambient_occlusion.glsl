@@ -4,8 +4,8 @@
 //    irradiance that arrives; it multiplies the irradiance without occluders. The ratio is 1 where nothing occludes,
 //    whatever the directions are. The pixels of a small square have different ones (interleaved sampling): with the same
 //    in all pixels, what occludes throws a faint hard shadow for each direction.
-// 2. Lobes. Rays sampled by the VNDF give the share of the lobe that sees the environment; it multiplies the prefiltered
-//    radiance (split sum).
+// 2. Lobes. Rays sampled by the VNDF give the share of the environment's light that arrives in the lobe; it multiplies the
+//    prefiltered radiance (split sum).
 // 3. Interreflection. What occludes sends the light of lamps and of the environment: a radiosity B that the host has found for
 //    the whole scene, by place and direction (src/transport/occluders.rs). With O the share that is occluded,
 //    E = V E₀ + O B.
@@ -35,8 +35,8 @@ const uint COAT_LOBE_EVENT = 0x401u;
 
 // What the directions so far have shown: sums that are shares at the end.
 struct SkyShown {
-    vec3 seen;               // light that arrives
-    vec3 all;                // and without occluders
+    vec3 seen;             // light that arrives
+    vec3 all;              // and without occluders
     vec3 occluded;         // by cosine and solid angle
     vec3 occluded_along;   // sums over the occluded directions of their squared components: the positive ones,
     vec3 occluded_against; // and the negative ones
@@ -79,6 +79,22 @@ vec3 free_side(Surface s, SkyRay r) {
     return DIFFUSE_TRANSMISSION && r.side < 0.0 ? reflect(s.v, s.n_triangle) : s.v;
 }
 
+// The squared positive and negative components of a direction, times its weight.
+struct Squares {
+    vec3 along;
+    vec3 against;
+};
+
+Squares squares_of(vec3 d, float weight) {
+    vec3 positive = max(d, 0.0);
+    vec3 negative = min(d, 0.0);
+    precise vec3 along = positive * positive;
+    precise vec3 against = negative * negative;
+    precise vec3 weighted_along = along * weight;
+    precise vec3 weighted_against = against * weight;
+    return Squares(weighted_along, weighted_against);
+}
+
 void show(inout SkyShown shown, SkyRay r, vec3 visible) {
     vec3 weight = light_of_environment(r.sky.weight) * r.cos_l;
     float projected = r.cos_l * r.sky.solid_angle;
@@ -94,15 +110,9 @@ void show(inout SkyShown shown, SkyRay r, vec3 visible) {
     // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
     vec3 hidden = 1.0 - visible;
     shown.occluded += projected * hidden;
-    precise float occluded = projected * mean(hidden);
-    vec3 along = max(r.sky.direction, 0.0);
-    vec3 against = min(r.sky.direction, 0.0);
-    precise vec3 along2 = along * along;
-    precise vec3 against2 = against * against;
-    precise vec3 more_along = along2 * occluded;
-    precise vec3 more_against = against2 * occluded;
-    shown.occluded_along += more_along;
-    shown.occluded_against += more_against;
+    Squares squares = squares_of(r.sky.direction, projected * mean(hidden));
+    shown.occluded_along += squares.along;
+    shown.occluded_against += squares.against;
 }
 
 // Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass
@@ -117,20 +127,8 @@ SkyShown shown_to(Surface s) {
     return shown;
 }
 
-// Share of a specular lobe that sees the environment, by the weights of its directions. An anisotropic lobe counts as a
-// round one of the α across.
-vec3 visible_lobe(Surface s, vec3 n, float alpha, uint event) {
-    vec3 seen = vec3(0.0);
-    float all = 0.0;
-    for (uint i = 0; i < LOBE_RAYS && loop_iterations < LOOP_BUDGET; i++) {
-        uint index = trace_terms.sample_index * LOBE_RAYS + i;
-        vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
-        vec3 r = reflect_ray(-s.v, h).R;
-        float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
-        seen += weight * visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0);
-        all += weight;
-    }
-    return all > 0.0 ? seen / all : vec3(1.0);
+vec3 share_of(vec3 seen, vec3 all) {
+    return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }
 
 // m v: a matrix product is not precise, whatever holds its result.
@@ -154,6 +152,47 @@ vec3 occluder_radiosity(vec3 p, vec3 along, vec3 against, float share) {
     return light_of_rgb(max(radiosity, 0.0));
 }
 
+// What the directions of a specular lobe have shown to it.
+struct LobeShown {
+    vec3 open;   // share of the environment's light that arrives
+    vec3 hidden; // share of the lobe that is occluded
+    vec3 beside; // radiance of what occludes
+};
+
+// The directions have the lobe's weights. Their light is that of the environment in half as wide a lobe around each: with few
+// directions the whole lobe is covered (filtered importance sampling, Krivanek and Colbert 2008). An anisotropic lobe counts as a round
+// one of the α across.
+LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
+    vec3 seen = vec3(0.0);
+    vec3 all_light = vec3(0.0);
+    vec3 hidden = vec3(0.0);
+    vec3 sum_along = vec3(0.0);
+    vec3 sum_against = vec3(0.0);
+    float all = 0.0;
+    for (uint i = 0; i < LOBE_RAYS && loop_iterations < LOOP_BUDGET; i++) {
+        uint index = trace_terms.sample_index * LOBE_RAYS + i;
+        vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
+        vec3 r = reflect_ray(-s.v, h).R;
+        float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
+        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0);
+        vec3 light = prefiltered_radiance(r, 0.5 * alpha) * weight;
+        seen += light * visible;
+        all_light += light;
+        precise vec3 more = weight * (1.0 - visible);
+        hidden += more;
+        Squares squares = squares_of(r, mean(more));
+        sum_along += squares.along;
+        sum_against += squares.against;
+        all += weight;
+    }
+    precise float occluded = mean(hidden);
+    precise float share = occluded / max(all, 1e-30);
+    precise vec3 along = sum_along / max(occluded, 1e-30);
+    precise vec3 against = sum_against / max(occluded, 1e-30);
+    vec3 beside = occluder_radiosity(s.p_bvh, along, against, share) * INV_PI;
+    return LobeShown(share_of(seen, all_light), all > 0.0 ? hidden / all : vec3(0.0), beside);
+}
+
 vec3 radiosity_in_front(Surface s, SkyShown shown) {
     precise float occluded = mean(shown.occluded);
     precise float share = occluded / max(shown.hemisphere, 1e-30);
@@ -171,36 +210,26 @@ vec3 radiosity_behind(Surface s, vec3 shut) {
     return occluder_radiosity(s.p_bvh, along, against, mean(shut));
 }
 
-// The radiance in a lobe of which the share `visible` sees the environment.
-vec3 partly_occluded(vec3 open, vec3 beside, vec3 visible) {
-    precise vec3 seen = open * visible;
-    precise vec3 occluded = beside * (1.0 - visible);
+// The radiance in a lobe that would be `open` without occluders.
+vec3 partly_occluded(vec3 open, LobeShown shown) {
+    precise vec3 seen = open * shown.open;
+    precise vec3 occluded = shown.beside * shown.hidden;
     precise vec3 sum = seen + occluded;
     return sum;
 }
 
-vec3 share_of(vec3 seen, vec3 all) {
-    return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
-}
-
-// What a surface makes of the light that the directions have shown to it.
-struct OccludedLight {
-    vec3 diffuse; // radiance to the eye
-    vec3 beside;  // radiance of what occludes
-};
-
-OccludedLight occluded_light(Surface s, EnvironmentFactors factors, SkyShown shown) {
+// Radiance to the eye of the light that the directions have shown to a surface, but for its lobes.
+vec3 occluded_light(Surface s, EnvironmentFactors factors, SkyShown shown) {
     precise vec3 occluded_share = shown.occluded / max(shown.hemisphere, 1e-30);
     precise vec3 here = environment_irradiance(s.n) * share_of(shown.seen, shown.all);
-    vec3 radiosity = radiosity_in_front(s, shown);
-    precise vec3 irradiance = here + occluded_share * radiosity;
+    precise vec3 irradiance = here + occluded_share * radiosity_in_front(s, shown);
     precise vec3 behind = vec3(0.0);
     if (DIFFUSE_TRANSMISSION) {
         vec3 open = share_of(shown.seen_behind, shown.all_behind);
         precise vec3 shut = 1.0 - open;
         behind = environment_irradiance(-s.n) * open + shut * radiosity_behind(s, shut);
     }
-    return OccludedLight(diffuse_environment_light(factors, irradiance, behind), radiosity * INV_PI);
+    return diffuse_environment_light(factors, irradiance, behind);
 }
 
 // All that needs the layers is evaluated before rays are traced, and light is summed as soon as it is known: what is kept until later
@@ -211,17 +240,16 @@ vec3 occluded_environment_light(Surface s) {
     vec3 coat_mirrored = vec3(0.0);
     if (REFLECTION && !s.base_traced) mirrored = radiance_in_base_lobe(s);
     if (CLEARCOAT && REFLECTION && !s.coat_traced) coat_mirrored = radiance_in_coat_lobe(s);
-    OccludedLight light = occluded_light(s, factors, shown_to(s));
-    vec3 result = light.diffuse;
+    vec3 result = occluded_light(s, factors, shown_to(s));
     if (!REFLECTION) return result;
     if (LOBE_RAYS > 0) {
         // First the base, then the coat, in a loop: the code that traces lobes exists once.
         for (uint i = 0; i < (CLEARCOAT ? 2u : 1u); i++) {
             bool coat = CLEARCOAT && i == 1;
             if (coat ? !s.coat_traced : !s.base_traced) {
-                vec3 visible = visible_lobe(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
-                if (coat) coat_mirrored = partly_occluded(coat_mirrored, light.beside, visible);
-                else mirrored = partly_occluded(mirrored, light.beside, visible);
+                LobeShown shown = lobe_shown(s, coat ? s.n_coat : s.n, coat ? s.clearcoat_alpha : s.alpha, coat ? COAT_LOBE_EVENT : BASE_LOBE_EVENT);
+                if (coat) coat_mirrored = partly_occluded(coat_mirrored, shown);
+                else mirrored = partly_occluded(mirrored, shown);
             }
         }
     }
@@ -246,7 +274,7 @@ LayersAtHit layers_at_hit(Surface s) {
 }
 
 vec3 environment_light_at_hit(Surface s, LayersAtHit layers, SkyShown shown) {
-    precise vec3 result = occluded_light(s, layers.factors, shown).diffuse + layers.mirrored;
+    precise vec3 result = occluded_light(s, layers.factors, shown) + layers.mirrored;
     return s.unlit ? vec3(0.0) : result;
 }
 #endif

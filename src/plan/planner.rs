@@ -222,15 +222,17 @@ impl Planner<'_> {
         let there_is = surroundings.environment;
         let cause = Cause::when(there_is, "there is an environment", "there is no environment");
         let environment = decisions.decide(EffectId::Environment, cause);
-        // Without an environment rays of ambient occlusion find surfaces that lamps light.
+        // Without an environment rays of ambient occlusion find surfaces that send light: that of lamps, or their own.
         let rays = knobs.indirect.occlusion_rays();
-        let lamps = scene.lights.iter().any(|light| shines_on(light, *bounds))
-            || (knobs.lights != rungs::Lights::Points && surfaces.any(is_emitter));
-        let by_surfaces = !there_is && rays > 0 && lamps && surroundings.faced;
-        let shown = |called_for: bool, against: &str| match (there_is, by_surfaces, lamps && rays > 0) {
+        let lit = scene.lights.iter().any(|light| shines_on(light, *bounds))
+            || (knobs.lights != rungs::Lights::Points && surfaces.any(is_emitter))
+            || surfaces.any(|m| m.unlit && m.base_color[..3] != [0.0; 3]);
+        let lit = rays > 0 && lit;
+        let by_surfaces = !there_is && lit && surroundings.faced;
+        let shown = |called_for: bool, against: &str| match (there_is, by_surfaces, lit) {
             (true, ..) => Cause::when(called_for, "there is an environment", against),
-            (_, true, _) => Cause::when(called_for, "lamps light surfaces that others face", against),
-            (.., true) => Cause::against("there is no environment, and no surface sends light of lamps to another one"),
+            (_, true, _) => Cause::when(called_for, "surfaces send light that others face", against),
+            (.., true) => Cause::against("there is no environment, and no surface sends light to another one"),
             _ => Cause::against("there is no environment"),
         };
         let rung = knobs.reflection;

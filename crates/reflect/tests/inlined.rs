@@ -6,7 +6,7 @@ use std::path::Path;
 /// The largest stage, `path.comp`, has 240 thousand; with each call written out it had 418.
 const LARGEST: usize = 240_000;
 /// All together have 1,512 thousand; they had 2,508.
-const TOGETHER: usize = 1_512_000;
+const TOGETHER: usize = 1_514_000;
 
 #[test]
 fn formulas_stand_once_in_a_kernel() {

@@ -39,9 +39,9 @@ effects! {
     Reflection = "reflection":
         "a surface or clear coat that is smooth enough for the rung of `lobes`" => "by rays: the BVH, tile lists, the ray tree; in screen space: a copy of the picture, passes",
     AmbientLight = "ambient light":
-        "an environment, or rays of ambient occlusion and lamps; and a surface with a diffuse part" => "code",
+        "an environment, or rays of ambient occlusion and surfaces that send light; and a surface with a diffuse part" => "code",
     AmbientOcclusion = "ambient occlusion":
-        "light from all around, of an environment or of surfaces in the light of lamps, with `indirect=occlusion:N`" => "the BVH, a pass",
+        "light from all around, of an environment or of surfaces, with `indirect=occlusion:N`" => "the BVH, a pass",
     PunctualLights = "punctual lights":
         "a light that shines and reaches a surface that it lights" => "the light table; code",
     Shadows = "shadows":
