@@ -98,8 +98,8 @@ fn mean(radiosity: &OccluderRadiosity) -> f64 {
     radiosity.at(DVec3::ZERO, [DVec3::splat(1.0 / 6.0); 2], 1.0).x
 }
 
-/// In uniform light of radiance 1 white surfaces have its radiosity π, whatever they face, and whether they reflect light
-/// or transmit it.
+/// In uniform light of radiance 1 white surfaces have its radiosity π, whatever they face, and whether they reflect
+/// light or transmit it.
 #[test]
 fn white_surfaces_in_uniform_light_have_its_radiosity() {
     let mut leaf = painted([1.0, 1.0, 1.0]);

@@ -37,14 +37,14 @@ const uint COAT_LOBE_EVENT = 0x401u;
 struct SkyShown {
     vec3 seen;             // light that arrives
     vec3 all;              // and without occluders
-    vec3 occluded;         // by cosine and solid angle
+    float hemisphere;      // by cosine and solid angle
+    float occluded;        // of it
     vec3 occluded_along;   // sums over the occluded directions of their squared components: the positive ones,
     vec3 occluded_against; // and the negative ones
-    float hemisphere;
     vec3 seen_behind; // on the other side, where the surface transmits diffusely
     vec3 all_behind;
 };
-const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), 0.0, vec3(0.0), vec3(0.0));
+const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
 
 // One of the directions, as a surface has it.
 struct SkyRay {
@@ -109,8 +109,9 @@ void show(inout SkyShown shown, SkyRay r, vec3 visible) {
     shown.hemisphere += projected;
     // The mean of zeros is 0; one minus the mean of ones may be 1e-7, where products and sums are fused.
     vec3 hidden = 1.0 - visible;
-    shown.occluded += projected * hidden;
-    Squares squares = squares_of(r.sky.direction, projected * mean(hidden));
+    precise float occluded = projected * mean(hidden);
+    shown.occluded += occluded;
+    Squares squares = squares_of(r.sky.direction, occluded);
     shown.occluded_along += squares.along;
     shown.occluded_against += squares.against;
 }
@@ -155,7 +156,7 @@ vec3 occluder_radiosity(vec3 p, vec3 along, vec3 against, float share) {
 // What the directions of a specular lobe have shown to it.
 struct LobeShown {
     vec3 open;   // share of the environment's light that arrives
-    vec3 hidden; // share of the lobe that is occluded
+    float hidden; // share of the lobe that is occluded
     vec3 beside; // radiance of what occludes
 };
 
@@ -165,9 +166,8 @@ struct LobeShown {
 LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
     vec3 seen = vec3(0.0);
     vec3 all_light = vec3(0.0);
-    vec3 hidden = vec3(0.0);
-    vec3 sum_along = vec3(0.0);
-    vec3 sum_against = vec3(0.0);
+    vec3 towards = vec3(0.0);
+    float hidden = 0.0;
     float all = 0.0;
     for (uint i = 0; i < LOBE_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         uint index = trace_terms.sample_index * LOBE_RAYS + i;
@@ -178,27 +178,25 @@ LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
         vec3 light = prefiltered_radiance(r, 0.5 * alpha) * weight;
         seen += light * visible;
         all_light += light;
-        precise vec3 more = weight * (1.0 - visible);
+        precise float more = weight * (1.0 - mean(visible));
         hidden += more;
-        Squares squares = squares_of(r, mean(more));
-        sum_along += squares.along;
-        sum_against += squares.against;
+        towards += r * more;
         all += weight;
     }
-    precise float occluded = mean(hidden);
-    precise float share = occluded / max(all, 1e-30);
-    precise vec3 along = sum_along / max(occluded, 1e-30);
-    precise vec3 against = sum_against / max(occluded, 1e-30);
-    vec3 beside = occluder_radiosity(s.p_bvh, along, against, share) * INV_PI;
-    return LobeShown(share_of(seen, all_light), all > 0.0 ? hidden / all : vec3(0.0), beside);
+    precise float share = hidden / max(all, 1e-30);
+    float length2 = dot(towards, towards);
+    Squares squares = squares_of(length2 > 0.0 ? towards * inversesqrt(length2) : n, 1.0);
+    vec3 beside = occluder_radiosity(s.p_bvh, squares.along, squares.against, share) * INV_PI;
+    return LobeShown(share_of(seen, all_light), share, beside);
 }
 
-vec3 radiosity_in_front(Surface s, SkyShown shown) {
-    precise float occluded = mean(shown.occluded);
-    precise float share = occluded / max(shown.hemisphere, 1e-30);
-    precise vec3 along = shown.occluded_along / max(occluded, 1e-30);
-    precise vec3 against = shown.occluded_against / max(occluded, 1e-30);
-    return occluder_radiosity(s.p_bvh, along, against, share);
+// Irradiance from what occludes on the viewer's side.
+vec3 irradiance_of_occluders(Surface s, SkyShown shown) {
+    precise float share = shown.occluded / max(shown.hemisphere, 1e-30);
+    precise vec3 along = shown.occluded_along / max(shown.occluded, 1e-30);
+    precise vec3 against = shown.occluded_against / max(shown.occluded, 1e-30);
+    precise vec3 irradiance = occluder_radiosity(s.p_bvh, along, against, share) * share;
+    return irradiance;
 }
 
 // All directions around −n are taken to be occluded evenly: by the cosine their squares are (1 + n²)/4 for each axis, of which
@@ -220,9 +218,8 @@ vec3 partly_occluded(vec3 open, LobeShown shown) {
 
 // Radiance to the eye of the light that the directions have shown to a surface, but for its lobes.
 vec3 occluded_light(Surface s, EnvironmentFactors factors, SkyShown shown) {
-    precise vec3 occluded_share = shown.occluded / max(shown.hemisphere, 1e-30);
     precise vec3 here = environment_irradiance(s.n) * share_of(shown.seen, shown.all);
-    precise vec3 irradiance = here + occluded_share * radiosity_in_front(s, shown);
+    precise vec3 irradiance = here + irradiance_of_occluders(s, shown);
     precise vec3 behind = vec3(0.0);
     if (DIFFUSE_TRANSMISSION) {
         vec3 open = share_of(shown.seen_behind, shown.all_behind);

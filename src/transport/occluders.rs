@@ -1,10 +1,11 @@
 //! The radiosity of what the surfaces of a scene face: the light that occluders send in place of what they hide.
 //!
 //! Read Goral, Torrance, Greenberg and Battaile 1984 (radiosity); pbrt (4th ed.), chapter 13 (path tracing);
-//! docs/decisions/ambient-occlusion.md. Paths start on surfaces, by area and cosine as light arrives there, and take all
-//! surfaces to be diffuse. What the first ray meets sends the radiosity B, from lamps and from the environment, over any
-//! number of surfaces. An ambient cube (McTaggart 2004, "Half-Life 2 / Valve Source Shading") with slopes by place and by
-//! the occluded share is fitted to B by least squares. It is the same for every device, traversal and camera.
+//! docs/decisions/ambient-occlusion.md. Paths start on surfaces, by area and cosine as light arrives there, and
+//! take all surfaces to be diffuse. What the first ray meets sends the radiosity B, from lamps and from the
+//! environment, over any number of surfaces. An ambient cube (McTaggart 2004, "Half-Life 2 / Valve Source
+//! Shading") with slopes by place and by the occluded share is fitted to B by least squares. It is the same for
+//! every device, traversal and camera.
 
 use std::array::from_fn;
 use std::f64::consts::{PI, TAU};
