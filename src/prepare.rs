@@ -91,7 +91,8 @@ impl Original {
         built.clone().map_err(|error| anyhow!(error))
     }
 
-    /// The plan of the scene under the chosen rungs, without any other preparation.
+    /// The plan of the scene under the chosen rungs, without any other preparation: surfaces are taken to send light to
+    /// others where lamps could light them.
     ///
     /// # Errors
     /// When the scene has nothing to draw.
@@ -214,9 +215,13 @@ impl Prepared {
         let mut occluder_radiosity = OccluderRadiosity::ZERO;
         if plan.occlusion_rays() > 0 {
             let (bvh, _) = original.tree_of(|| &scene)?;
-            let lamps = Emitters::of(&scene, None, emitting);
+            let mut lit = scene.clone();
+            if !shaped {
+                lit.lights.iter_mut().for_each(|light| light.extent = None);
+            }
+            let lamps = Emitters::of(&lit, None, emitting);
             occluder_radiosity =
-                OccluderRadiosity::of(&scene, &facts.solids, &bvh, &lamps, conditions.sky, offset_of(&bvh));
+                OccluderRadiosity::of(&lit, &facts.solids, &bvh, &lamps, conditions.sky, offset_of(&bvh));
             // Without an environment rays would only look for the light of surfaces that have none.
             if conditions.sky.is_none() && occluder_radiosity.is_zero() {
                 plan = Plan::new(&canonical, &facts, Surroundings { faced: false, ..surroundings }, conditions.knobs);

@@ -1,4 +1,4 @@
-//! The radiosity of occluders on the host, in closed form.
+//! The radiosity of occluders on the host, against closed forms.
 //!
 //! Read docs/decisions/ambient-occlusion.md.
 

@@ -1,4 +1,4 @@
-// Ray-traced ambient occlusion: light of the environment on a surface, with the visibility of the environment.
+// Ray-traced ambient occlusion: light of the environment on a surface, with visibility, and of what occludes it.
 // 1. Irradiance. Directions l are the middles of regions of the environment: a median cut
 //    (src/transport/sky_directions.rs), with the regions' power as weights w. Σ w cos θ V / Σ w cos θ is the share of the
 //    irradiance that arrives; it multiplies the irradiance without occluders. The ratio is 1 where nothing occludes,
@@ -9,7 +9,8 @@
 // 3. Interreflection. What occludes sends the light of lamps and of the environment: a radiosity B that the host has found for
 //    the whole scene, by place and direction (src/transport/occluders.rs). With O the share that is occluded,
 //    E = V E₀ + O B.
-// 4. Light from behind, which a surface transmits diffusely, in the same way.
+// 4. Light from behind, which a surface transmits diffusely, in the same way with the environment's power for shares: without
+//    an environment there is none.
 // Where to read: RTR 4, section 11.3 (ambient occlusion, interreflections); Goral et al. 1984 (radiosity); Keller and
 // Heidrich 2001 (interleaved sampling).
 // Assumes: bvh space, metres; a surface whose `lobe` is known.
@@ -155,13 +156,13 @@ vec3 occluder_radiosity(vec3 p, vec3 along, vec3 against, float share) {
 
 // What the directions of a specular lobe have shown to it.
 struct LobeShown {
-    vec3 open;   // share of the environment's light that arrives
+    vec3 open;    // share of the environment's light that arrives
     float hidden; // share of the lobe that is occluded
-    vec3 beside; // radiance of what occludes
+    vec3 beside;  // radiance of what occludes
 };
 
 // The directions have the lobe's weights. Their light is that of the environment in half as wide a lobe around each: with few
-// directions the whole lobe is covered (filtered importance sampling, Krivanek and Colbert 2008). An anisotropic lobe counts as a round
+// directions the whole lobe is covered (filtered importance sampling, Křivánek and Colbert 2008). An anisotropic lobe counts as a round
 // one of the α across.
 LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
     vec3 seen = vec3(0.0);

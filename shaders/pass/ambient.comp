@@ -1,4 +1,4 @@
-// Environment lighting with ray-traced ambient occlusion, over the tiles with surfaces (tile classification).
+// Light of the environment and of what occludes it (ambient occlusion), over the tiles with surfaces (tile classification).
 // It takes the place of the environment's part of light.comp and adds to the radiance. Where to read: RTR 4, section 11.3;
 // docs/decisions/ambient-occlusion.md. Assumes: world axes, positions relative to the eye.
 #version 460

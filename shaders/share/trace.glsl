@@ -4,7 +4,7 @@
 #ifndef SHARE_TRACE_GLSL
 #define SHARE_TRACE_GLSL
 // Of what the scene's surfaces face, in W/m²: an ambient cube, whose sides count by the squares of the direction's components,
-// with a slope by the place in bvh space.
+// with slopes by the place in bvh space and by the share that is occluded.
 struct OccluderRadiosity {
     mat3 along;    // columns: seen along an axis
     mat3 against;  // and in the opposite direction

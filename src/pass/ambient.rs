@@ -1,4 +1,4 @@
-//! Environment lighting with ray-traced ambient occlusion (shaders/pass/ambient.comp).
+//! Light from all around with ray-traced ambient occlusion (shaders/pass/ambient.comp).
 //!
 //! Read Real-Time Rendering (4th ed.), section 11.3, and docs/decisions/ambient-occlusion.md.
 
@@ -10,7 +10,7 @@ use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
 use crate::shader::ambient;
 
-/// Adds the environment's light to `radiance` at pixels with a surface, by indirect dispatch over the list of surface
+/// Adds the light of the environment and of what occludes it to `radiance` at pixels with a surface, by indirect dispatch over the list of surface
 /// tiles.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! The radiosity of what the surfaces of a scene face: the light that occluders send in place of what they hide.
 //!
 //! Read Goral, Torrance, Greenberg and Battaile 1984 (radiosity); pbrt (4th ed.), chapter 13 (path tracing);
-//! docs/decisions/ambient-occlusion.md. Paths start on surfaces, by area and cosine as light arrives there, and
+//! docs/decisions/ambient-occlusion.md. Paths start on surfaces, by the cosine as light arrives there, and
 //! take all surfaces to be diffuse. What the first ray meets sends the radiosity B, from lamps and from the
 //! environment, over any number of surfaces. An ambient cube (McTaggart 2004, "Half-Life 2 / Valve Source
 //! Shading") with slopes by place and by the occluded share is fitted to B by least squares. It is the same for
@@ -33,6 +33,9 @@ const FIRST_SAMPLES: u32 = 4;
 const SKY_DIRECTIONS: u32 = 256;
 /// Surfaces of a path after which Russian roulette may end it.
 const SURE_SURFACES: u32 = 3;
+/// Distance of a lamp, in parts of the scene's diagonal, below which it is no brighter: a path beside one would bend
+/// the function for the whole scene.
+const NEAREST_LAMP: f64 = 0.01;
 /// Surfaces that a ray passes at most.
 const MOST_PASSED: u32 = 32;
 /// Coefficients: the mean, what the cube's six sides have beside it, the slopes by place and by the occluded share.
@@ -74,22 +77,36 @@ impl OccluderRadiosity {
         let mut sky = sky.map_or_else(Vec::new, |sky| Sphere::new(sky).directions(SKY_DIRECTIONS, 0));
         sky.iter_mut().for_each(|at| at.weight = at.weight.map(|weight| weight * intensity));
         let first_triangles = scene.first_triangles();
-        let lit = LitScene { scene, solids, bvh, emitters, sky, offset, first_triangles };
-        let mut area = 0.0;
+        let size = bvh.nodes.first().map_or(0.0, |root| {
+            let [min, max] = [root.bounds().min, root.bounds().max].map(|corner| Vec3::from(corner).as_dvec3());
+            (max - min).length()
+        });
+        let nearest = NEAREST_LAMP * size;
+        let lit = LitScene { scene, solids, bvh, emitters, sky, offset, nearest, first_triangles };
         let areas: Vec<f64> = bvh
             .triangles
             .iter()
             .map(|triangle| {
                 let [_, ab, ac] = edges(triangle);
-                area += ab.cross(ac).length();
-                area
+                ab.cross(ac).length()
+            })
+            .collect();
+        // Half of the points by area, half evenly over the triangles: by area alone hardly any would lie on what stands
+        // on a large ground.
+        let total: f64 = areas.iter().sum();
+        let mut sum = 0.0;
+        let chosen: Vec<f64> = areas
+            .iter()
+            .map(|area| {
+                sum += 0.5 * area / total + 0.5 / areas.len() as f64;
+                sum
             })
             .collect();
         let found: Vec<Vec<Sent>> = (0..POINTS)
             .into_par_iter()
             .filter_map(|i| {
-                let at = (i as f64 + 0.5) / POINTS as f64 * area;
-                Some(lit.arriving(bvh.triangles.get(areas.partition_point(|&up_to| up_to <= at))?, i))
+                let at = (i as f64 + 0.5) / POINTS as f64 * sum;
+                Some(lit.arriving(bvh.triangles.get(chosen.partition_point(|&up_to| up_to <= at))?, i))
             })
             .collect();
         Self::fitted(&found.concat())
@@ -183,6 +200,8 @@ struct LitScene<'a> {
     emitters: &'a Emitters,
     sky: Vec<SkyDirection>,
     offset: f64,
+    /// Distance in metres below which a lamp is no brighter.
+    nearest: f64,
     first_triangles: Vec<u32>,
 }
 
@@ -328,10 +347,15 @@ impl LitScene<'_> {
         if cos <= 0.0 || arriving == DVec3::ZERO {
             return DVec3::ZERO;
         }
-        // A directional light has no place, only a direction.
-        let directional = matches!(emitter.source, EmitterSource::Punctual(i)
-            if matches!(self.scene.lights[i as usize].kind, LightKind::Directional { .. }));
-        let distance = if directional { f64::INFINITY } else { to_light.length() - self.offset };
+        // A directional light has no place, only a direction; a ball of light begins before its middle.
+        let distance = match emitter.source {
+            EmitterSource::Punctual(i) => match self.scene.lights[i as usize] {
+                Light { kind: LightKind::Directional { .. }, .. } => f64::INFINITY,
+                Light { extent: Some(Extent::Sphere { radius }), .. } => to_light.length() - radius,
+                _ => to_light.length() - self.offset,
+            },
+            _ => to_light.length() - self.offset,
+        };
         arriving * (cos / emitter.probability * self.visibility(at, l, distance))
     }
 
@@ -339,7 +363,8 @@ impl LitScene<'_> {
     fn light_of_lamp(&self, light: &Light, at: DVec3, random: &mut SplitMix64) -> (DVec3, DVec3) {
         let color = rgb(light.color);
         let falloff = |to_light: DVec3, range: Option<f64>| {
-            point_falloff(to_light.length_squared(), range.map_or(0.0, |range| (range * range).recip()))
+            let r2 = to_light.length_squared().max(self.nearest * self.nearest);
+            point_falloff(r2, range.map_or(0.0, |range| (range * range).recip()))
         };
         match light.kind {
             LightKind::Directional { direction } => (-direction, color),

@@ -79,7 +79,7 @@ impl EnvironmentOnDevice {
                 true => mean_chain(environment),
                 false => one_texel(environment),
             },
-            // Lobes look it up where only surfaces send light, and every effect where all of them are forced.
+            // Lobes look it up where only surfaces send light.
             None if lights => one_texel(&Environment::constant([0.0; 3])),
             _ => Vec::new(),
         };

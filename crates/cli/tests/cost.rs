@@ -266,7 +266,7 @@ fn one_approximation_has_two_lines_and_a_verdict() {
     assert!(lines[2].contains("adds an error of"), "{said}");
     // Where only one of both traces paths, its noise is taken away as in a reference.
     let by_path = ["--model", "recursive", "--json"];
-    let json = compare("study:cornell", "indirect=occlusion:16,path", &by_path).succeeded().stdout;
+    let json = compare("study:cornell", "indirect=ambient,path", &by_path).succeeded().stdout;
     let json: Value = serde_json::from_str(&json).expect("JSON");
     let error = |end: &str| number(&json["price"]["shown_delta"][end]).sqrt();
     assert!(json["price"]["error_told"] == true && error("low") > 0.05 && error("high") < 0.1, "{json}");
