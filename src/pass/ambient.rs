@@ -10,8 +10,8 @@ use super::lighting::Lighting;
 use crate::gpu::{Frame, Image};
 use crate::shader::ambient;
 
-/// Adds the light of the environment and of what occludes it to `radiance` at pixels with a surface, by indirect dispatch over the list of surface
-/// tiles.
+/// Adds the light of the environment and of what occludes it to `radiance` at pixels with a surface, by indirect
+/// dispatch over the list of surface tiles.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.
