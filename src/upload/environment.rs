@@ -79,13 +79,13 @@ impl EnvironmentOnDevice {
                 true => mean_chain(environment),
                 false => one_texel(environment),
             },
-            // Lobes look it up where only surfaces send light.
-            None if lights => one_texel(&Environment::constant([0.0; 3])),
             _ => Vec::new(),
         };
         let sky = image(device, "environment", &chain)?;
         let levels = match (plan.prefilter, plan.reflection) {
             (true, _) => prefilter(device, &sky, &chain)?,
+            // Lobes look it up also where only surfaces send light.
+            (false, true) if chain.is_empty() => one_texel(&Environment::constant([0.0; 3])),
             (false, true) => chain.clone(),
             (false, false) => Vec::new(),
         };
