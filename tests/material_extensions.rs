@@ -431,8 +431,8 @@ fn a_shade_is_lit_through_its_own_walls() {
     made.front(0.3);
     let (back, through) = (0.45, 0.4);
     let want = 0.5 * (back + through * through / (1.0 - back));
-    // Without visibility it would be 0.5 (ρ + τ), 15 % more.
-    for (of, samples, bound) in [(Model::Recursive, 4, 1e-4), (Model::Global, 256, 0.01)] {
+    // Without visibility it would be 0.5 (ρ + τ), 15 % more. What the inside sends is the mean of some 8000 paths.
+    for (of, samples, bound) in [(Model::Recursive, 4, 0.03), (Model::Global, 256, 0.01)] {
         let (_, film) = gpu.shot(&made.0, Some(&sky), model(of, [16, 16], &[&format!("samples={samples}")]));
         let mean = film.rgba.iter().map(|pixel| f64::from(pixel[0])).sum::<f64>() / film.rgba.len() as f64;
         assert!((mean / want - 1.0).abs() < bound, "{of:?}: {mean}, not {want}");
