@@ -449,8 +449,10 @@ fn what_a_mirror_shows_and_what_a_pane_lets_through_is_lit_as_what_is_seen_witho
             // Paths end at the dome, which sees itself in the mirror.
             let interfaces = if what == "mirror" { "interfaces=2" } else { "interfaces=8" };
             let choices = ["brdf=ggx", "fresnel=schlick", "refraction=ray", interfaces];
-            let samples = if of == Model::Global { "samples=4" } else { "samples=1" };
-            let mut film = gpu.film(scene, model(of, DOME, &[&choices[..], &[samples]].concat()));
+            // The mirror would send light to the dome, and the dome to itself.
+            let path = of == Model::Global;
+            let more = if path { ["samples=4", "indirect=path"] } else { ["samples=1", "indirect=off"] };
+            let mut film = gpu.film(scene, model(of, DOME, &[&choices[..], &more].concat()));
             if what == "mirror" {
                 film.rgba.chunks_exact_mut(DOME[0] as usize).for_each(|row| row.reverse());
             }
