@@ -178,7 +178,7 @@ fn planned(scene: &mut Scene, conditions: &Conditions<'_>) -> Result<(Plan, Fact
         grey: sky.is_some_and(|sky| Environment::is_grey(sky.map)),
         sky: background,
         blurred,
-        faced: true,
+        interreflection: true,
         forced,
     };
     let plan = Plan::new(scene, &facts, surroundings, knobs);
@@ -224,7 +224,12 @@ impl Prepared {
                 OccluderRadiosity::of(&lit, &facts.solids, &bvh, &lamps, conditions.sky, offset_of(&bvh));
             // Without an environment rays would only look for the light of surfaces that have none.
             if conditions.sky.is_none() && occluder_radiosity.is_zero() {
-                plan = Plan::new(&canonical, &facts, Surroundings { faced: false, ..surroundings }, conditions.knobs);
+                plan = Plan::new(
+                    &canonical,
+                    &facts,
+                    Surroundings { interreflection: false, ..surroundings },
+                    conditions.knobs,
+                );
             }
         }
         let solids = facts.solids;
@@ -241,7 +246,7 @@ impl Prepared {
         let hierarchy = match plan.rays {
             Some(rays) => {
                 let tree = original.tree_of(|| &scene)?;
-                Some(Hierarchy { occluder_radiosity, ..Hierarchy::of(&scene, tree, &solids, rays) })
+                Some(Hierarchy::of(&scene, tree, &solids, rays, occluder_radiosity))
             }
             None => None,
         };
@@ -264,17 +269,22 @@ impl Prepared {
         let rays = Rays::default();
         let plan = Plan { rays: Some(rays), ..Plan::new(&scene, &facts, surroundings, &Knobs::default()) };
         let tree = Original::from(scene.clone()).tree_of(|| &scene)?;
-        let hierarchy = Some(Hierarchy::of(&scene, tree, &facts.solids, rays));
+        let hierarchy = Some(Hierarchy::of(&scene, tree, &facts.solids, rays, OccluderRadiosity::ZERO));
         let solids = facts.solids;
         Ok(Self { scene, plan, solids, emitters: Emitters::default(), hierarchy, warnings: Vec::new() })
     }
 }
 
 impl Hierarchy {
-    fn of(scene: &Scene, (bvh, build_ms): Tree, solids: &Solids, rays: Rays) -> Self {
+    fn of(
+        scene: &Scene,
+        (bvh, build_ms): Tree,
+        solids: &Solids,
+        rays: Rays,
+        occluder_radiosity: OccluderRadiosity,
+    ) -> Self {
         let offset = offset_of(&bvh);
         let touching = rays.refraction && has_coincident_interfaces(&bvh, &solids.body, offset);
-        let occluder_radiosity = OccluderRadiosity::ZERO;
         Self { build_ms, offset, touching, occluder_radiosity, warnings: odd_triangles(scene, &bvh, solids), bvh }
     }
 }

@@ -599,7 +599,7 @@ fn planned(ways: &Ways, choice: &Choice, knobs: Knobs) -> Plan {
         grey: false,
         sky: environment != "none",
         blurred: false,
-        faced: true,
+        interreflection: true,
         forced: ForcedEffects::None,
     };
     Plan::new(&scene, &Facts::of(&scene, form), surroundings, &knobs)

@@ -75,7 +75,7 @@ mod tests {
                 grey: false,
                 sky: true,
                 blurred: false,
-                faced: true,
+                interreflection: true,
                 forced: ForcedEffects::All,
             };
             Plan::new(&Scene::default(), &Facts::default(), surroundings, &knobs)

@@ -39,7 +39,7 @@ pub struct Surroundings {
     /// Whether it is blurred there.
     pub blurred: bool,
     /// Whether surfaces send light to other surfaces; true where it is not known.
-    pub faced: bool,
+    pub interreflection: bool,
     /// Effects that are planned although the scene does not call for them.
     pub forced: ForcedEffects,
 }
@@ -52,7 +52,7 @@ impl Surroundings {
         grey: false,
         sky: false,
         blurred: false,
-        faced: true,
+        interreflection: true,
         forced: ForcedEffects::None,
     };
 }

@@ -228,7 +228,7 @@ impl Planner<'_> {
             || (knobs.lights != rungs::Lights::Points && surfaces.any(is_emitter))
             || surfaces.any(|m| m.unlit && m.base_color[..3] != [0.0; 3]);
         let lit = rays > 0 && lit;
-        let by_surfaces = !there_is && lit && surroundings.faced;
+        let by_surfaces = !there_is && lit && surroundings.interreflection;
         let shown = |called_for: bool, against: &str| match (there_is, by_surfaces, lit) {
             (true, ..) => Cause::when(called_for, "there is an environment", against),
             (_, true, _) => Cause::when(called_for, "surfaces send light that others face", against),
