@@ -40,12 +40,11 @@ struct SkyShown {
     vec3 all;              // and without occluders
     float hemisphere;      // by cosine and solid angle
     float occluded;        // of it
-    vec3 occluded_along;   // sums over the occluded directions of their squared components: the positive ones,
-    vec3 occluded_against; // and the negative ones
-    vec3 seen_behind; // on the other side, where the surface transmits diffusely
+    vec3 occluders;        // part of the occluders' radiosity that depends on direction
+    vec3 seen_behind;      // on the other side, where the surface transmits diffusely
     vec3 all_behind;
 };
-const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+const SkyShown NOTHING_SHOWN = SkyShown(vec3(0.0), vec3(0.0), 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0));
 
 // One of the directions, as a surface has it.
 struct SkyRay {
@@ -80,20 +79,33 @@ vec3 free_side(Surface s, SkyRay r) {
     return DIFFUSE_TRANSMISSION && r.side < 0.0 ? reflect(s.v, s.n_triangle) : s.v;
 }
 
-// The squared positive and negative components of a direction, times its weight.
-struct Squares {
-    vec3 along;
-    vec3 against;
-};
+// m v: a matrix product is not precise, whatever holds its result.
+vec3 by_axes(mat3 m, vec3 v) {
+    precise vec3 x = m[0] * v[0];
+    precise vec3 y = m[1] * v[1];
+    precise vec3 z = m[2] * v[2];
+    precise vec3 sum = x + y + z;
+    return sum;
+}
 
-Squares squares_of(vec3 d, float weight) {
+// The ambient cube of the radiosity of occluders, for the mean squares of the positive and negative components of directions. Here
+// and below every step is precise: a driver's compiler turns x (1 − a) + y a into an interpolation of its own, in one of two
+// ways, by what else stands in the program.
+vec3 ambient_cube(vec3 along, vec3 against) {
+    precise vec3 by_along = by_axes(trace_terms.occluder_radiosity.along, along);
+    precise vec3 by_against = by_axes(trace_terms.occluder_radiosity.against, against);
+    precise vec3 sum = by_along + by_against;
+    return sum;
+}
+
+// In direction d, times its weight.
+vec3 ambient_cube(vec3 d, float weight) {
     vec3 positive = max(d, 0.0);
     vec3 negative = min(d, 0.0);
     precise vec3 along = positive * positive;
     precise vec3 against = negative * negative;
-    precise vec3 weighted_along = along * weight;
-    precise vec3 weighted_against = against * weight;
-    return Squares(weighted_along, weighted_against);
+    precise vec3 weighted = ambient_cube(along, against) * weight;
+    return weighted;
 }
 
 void show(inout SkyShown shown, SkyRay r, vec3 visible) {
@@ -112,9 +124,7 @@ void show(inout SkyShown shown, SkyRay r, vec3 visible) {
     vec3 hidden = 1.0 - visible;
     precise float occluded = projected * mean(hidden);
     shown.occluded += occluded;
-    Squares squares = squares_of(r.sky.direction, occluded);
-    shown.occluded_along += squares.along;
-    shown.occluded_against += squares.against;
+    shown.occluders += ambient_cube(r.sky.direction, occluded);
 }
 
 // Apart from the rays of the lobes: in one loop with them lavapipe evaluates for every ray what either needs, and the pass
@@ -133,24 +143,12 @@ vec3 share_of(vec3 seen, vec3 all) {
     return mix(vec3(1.0), seen / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
 }
 
-// m v: a matrix product is not precise, whatever holds its result.
-vec3 by_axes(mat3 m, vec3 v) {
-    precise vec3 x = m[0] * v[0];
-    precise vec3 y = m[1] * v[1];
-    precise vec3 z = m[2] * v[2];
-    precise vec3 sum = x + y + z;
-    return sum;
-}
-
-// Radiosity of what occludes the share `share` of what a surface at p has around it: `along` and `against` are the means of the
-// squared positive and negative components of those directions. Here and below every step is precise: a driver's compiler turns
-// x (1 − a) + y a into an interpolation of its own, in one of two ways, by what else stands in the program.
-vec3 occluder_radiosity(vec3 p, vec3 along, vec3 against, float share) {
+// Radiosity of what occludes the share `share` of what a surface at p has around it; `by_direction` is the mean of the ambient cube over
+// those directions.
+vec3 occluder_radiosity(vec3 p, vec3 by_direction, float share) {
     precise vec3 by_share = trace_terms.occluder_radiosity.by_share * share;
     precise vec3 by_place = by_axes(trace_terms.occluder_radiosity.by_place, p);
-    precise vec3 by_along = by_axes(trace_terms.occluder_radiosity.along, along);
-    precise vec3 by_against = by_axes(trace_terms.occluder_radiosity.against, against);
-    precise vec3 radiosity = by_place + by_share + by_along + by_against;
+    precise vec3 radiosity = by_place + by_share + by_direction;
     return light_of_rgb(max(radiosity, 0.0));
 }
 
@@ -167,12 +165,14 @@ struct LobeShown {
 LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
     vec3 seen = vec3(0.0);
     vec3 all_light = vec3(0.0);
-    vec3 towards = vec3(0.0);
+    vec3 occluders = vec3(0.0);
     float hidden = 0.0;
     float all = 0.0;
     for (uint i = 0; i < LOBE_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         uint index = trace_terms.sample_index * LOBE_RAYS + i;
-        vec3 h = half_vector(n, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
+        // Else the frames that sampling needs would be kept while rays are traced: 16 registers on AMD.
+        vec3 around = found_anew(n, i);
+        vec3 h = half_vector(around, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
         vec3 r = reflect_ray(-s.v, h).R;
         float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
         vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0);
@@ -181,22 +181,20 @@ LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
         all_light += light;
         precise float more = weight * (1.0 - mean(visible));
         hidden += more;
-        towards += r * more;
+        occluders += ambient_cube(r, more);
         all += weight;
     }
     precise float share = hidden / max(all, 1e-30);
-    float length2 = dot(towards, towards);
-    Squares squares = squares_of(length2 > 0.0 ? towards * inversesqrt(length2) : n, 1.0);
-    vec3 beside = occluder_radiosity(s.p_bvh, squares.along, squares.against, share) * INV_PI;
+    precise vec3 by_direction = occluders / max(hidden, 1e-30);
+    vec3 beside = occluder_radiosity(s.p_bvh, by_direction, share) * INV_PI;
     return LobeShown(share_of(seen, all_light), share, beside);
 }
 
 // Irradiance from what occludes on the viewer's side.
 vec3 irradiance_of_occluders(Surface s, SkyShown shown) {
     precise float share = shown.occluded / max(shown.hemisphere, 1e-30);
-    precise vec3 along = shown.occluded_along / max(shown.occluded, 1e-30);
-    precise vec3 against = shown.occluded_against / max(shown.occluded, 1e-30);
-    precise vec3 irradiance = occluder_radiosity(s.p_bvh, along, against, share) * share;
+    precise vec3 by_direction = shown.occluders / max(shown.occluded, 1e-30);
+    precise vec3 irradiance = occluder_radiosity(s.p_bvh, by_direction, share) * share;
     return irradiance;
 }
 
@@ -206,7 +204,7 @@ vec3 radiosity_behind(Surface s, vec3 shut) {
     precise vec3 squares = (1.0 + s.n * s.n) * 0.125;
     precise vec3 along = squares * (1.0 - s.n);
     precise vec3 against = squares * (1.0 + s.n);
-    return occluder_radiosity(s.p_bvh, along, against, mean(shut));
+    return occluder_radiosity(s.p_bvh, ambient_cube(along, against), mean(shut));
 }
 
 // The radiance in a lobe that would be `open` without occluders.

@@ -169,10 +169,9 @@ float map_visibility(vec3 p, vec3 n, vec3 to_light, uint index, float size) {
 
 // Visibility by a shadow ray. p is in bvh space, n the normal of its triangle, source_face its coplanar group, v points to
 // the viewer, `media` are those on the light's side. The light is at p + to_light, or in that direction where t_max is
-// larger than 1; `ambient` as in `filtered`.
-vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_light, float t_max, bool ambient, bool wanted) {
+// larger than 1; `ambient` as in `filtered`. Who uses `to_light` afterwards takes it from here, and no second copy is kept.
+vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, inout vec3 to_light, float t_max, bool ambient, bool wanted) {
     vec3 origin = ray_origin(p, n, v);
-    float length_of_direction = vector_length(to_light);
     // Four roundings before the light, so that a surface touching it does not occlude it.
     float end = t_max == 1.0 ? 1.0 - 4.0 / 16777216.0 : t_max;
     shadow_rays += wanted ? 1u : 0u;
@@ -197,6 +196,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_l
         do {
             if (found) {
                 Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
+                float length_of_direction = vector_length(to_light);
                 uint medium = present_medium(media);
                 if (ABSORPTION == ABSORPTION_PATH && medium != 0) {
                     through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (hit.t - last.t) * length_of_direction);
@@ -211,6 +211,7 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, vec3 to_l
     } while (goes_on);
     uint medium = present_medium(media);
     if (ABSORPTION == ABSORPTION_PATH && medium != 0 && t_max == 1.0) {
+        float length_of_direction = vector_length(to_light);
         through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (1.0 - last.t) * length_of_direction);
     }
     return through;
