@@ -343,7 +343,23 @@ fn knobs_of_paths(ways: &Ways, choice: &Choice) -> Knobs {
     knobs
 }
 
-fn renderer_of(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_paths: bool) -> (Camera, Renderer) {
+fn traversal_of(choice: &Choice) -> Traversal {
+    match level(choice, "traversal") {
+        "links16" => Traversal::Links16,
+        "links32" => Traversal::Links32,
+        _ => Traversal::Stack,
+    }
+}
+
+/// With the device's own traversal, unless one is given.
+fn renderer_of(
+    gpu: &Gpu,
+    ways: &Ways,
+    choice: &Choice,
+    traversal: Option<Traversal>,
+    forced: ForcedEffects,
+    by_paths: bool,
+) -> (Camera, Renderer) {
     let made = scene(ways, choice);
     let environment = match level(choice, "environment") {
         "none" => None,
@@ -362,11 +378,7 @@ fn renderer_of(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, b
             "transparent" => Background::Transparent,
             _ => Background::Default,
         },
-        traversal: Some(match level(choice, "traversal") {
-            "links16" => Traversal::Links16,
-            "links32" => Traversal::Links32,
-            _ => Traversal::Stack,
-        }),
+        traversal,
         parts,
         forced,
         ..Settings::default()
@@ -376,7 +388,7 @@ fn renderer_of(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, b
 
 /// Draws one plan of all.
 fn drawn(gpu: &Gpu, ways: &Ways, choice: &Choice, forced: ForcedEffects, by_paths: bool) -> (Plan, Picture) {
-    let (camera, mut renderer) = renderer_of(gpu, ways, choice, forced, by_paths);
+    let (camera, mut renderer) = renderer_of(gpu, ways, choice, Some(traversal_of(choice)), forced, by_paths);
     let rendered = renderer.render(&camera, &mut |_| ()).expect("a picture");
     assert_eq!((rendered.counts.nan, rendered.counts.inf), (0, 0), "{ways:?} {choice:?}");
     let film = renderer.film().expect("the film");
@@ -482,7 +494,7 @@ fn compilers_spill_no_register() {
     let mut told = 0;
     for (i, (ways, choice)) in spread().iter().enumerate() {
         for by_paths in [false, true].into_iter().filter(|by_paths| !by_paths || i % 8 == 0) {
-            let (camera, mut renderer) = renderer_of(&gpu, ways, choice, ForcedEffects::None, by_paths);
+            let (camera, mut renderer) = renderer_of(&gpu, ways, choice, None, ForcedEffects::None, by_paths);
             for (program, constants) in
                 renderer.passes(&camera).expect("passes").iter().flat_map(|pass| &pass.pipelines)
             {

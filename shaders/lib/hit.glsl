@@ -230,8 +230,7 @@ const uint SPLITTING_SLOTS = SCATTERING_SLOTS & ~(1u << SLOT_EMISSIVE);
 // Of straight light, by the same layers as a path that passes undeflected.
 const uint PASSING_SLOTS = SPLITTING_SLOTS & ~(1u << SLOT_DIFFUSE_TRANSMISSION | 1u << SLOT_DIFFUSE_TRANSMISSION_COLOR);
 // Of transparent shadows, which count angles to the interpolated normal.
-const uint FILTERING_SLOTS = PASSING_SLOTS & ~(1u << SLOT_CLEARCOAT_NORMAL | 1u << SLOT_CLEARCOAT_ROUGHNESS | 1u << SLOT_ANISOTROPY |
-                                               (SHEEN ? 0u : 1u << SLOT_NORMAL));
+const uint FILTERING_SLOTS = PASSING_SLOTS & ~(1u << SLOT_CLEARCOAT_NORMAL | 1u << SLOT_CLEARCOAT_ROUGHNESS | 1u << SLOT_ANISOTROPY | 1u << SLOT_NORMAL);
 
 // The surface seen along `direction` by a ray (cone) of diameter `width` at the hit, from the textures of `slots`.
 HitSurface hit_surface(HitPoint point, vec3 direction, float width, uint slots) {

@@ -310,6 +310,17 @@ Layers in_turn(Layers b, uint of_turn) {
     b.s.f0_metal = found_anew(b.s.f0_metal, of_turn);
     b.s.metallic = found_anew(b.s.metallic, of_turn);
     b.s.lobe = found_anew(b.s.lobe, of_turn);
+    b.s.n = found_anew(b.s.n, of_turn);
+    b.s.v = found_anew(b.s.v, of_turn);
+    b.s.alpha = found_anew(b.s.alpha, of_turn);
+    b.s.alpha_along = found_anew(b.s.alpha_along, of_turn);
+    b.s.clearcoat_alpha = found_anew(b.s.clearcoat_alpha, of_turn);
+    b.s.film = found_anew(b.s.film, of_turn);
+    b.s.sheen = found_anew(b.s.sheen, of_turn);
+    b.s.ior = found_anew(b.s.ior, of_turn);
+    b.n1 = found_anew(b.n1, of_turn);
+    b.n2 = found_anew(b.n2, of_turn);
+    b.cos_v = found_anew(b.cos_v, of_turn);
     return b;
 }
 

@@ -215,7 +215,7 @@ vec3 radiance_to_eye(Surface s, ivec2 pixel, uint surface, uint tiles_across, Li
     if ((AMBIENT || REFLECTION) && !ENVIRONMENT_APART) around += environment_light(s, albedo);
     if (s.unlit) around = s.base;
     if (!all_around) around = vec3(0.0);
-    vec3 result = with_lights(around, layers_of(s, albedo), pixel, surface, tiles_across, range);
-    return s.unlit ? around : result;
+    if (s.unlit) range = LightRange(0, 0, 0, 0);
+    return with_lights(around, layers_of(s, albedo), pixel, surface, tiles_across, range);
 }
 #endif

@@ -38,4 +38,8 @@ vec2 found_anew(vec2 x, uint of_turn) {
 vec3 found_anew(vec3 x, uint of_turn) {
     return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
 }
+
+vec4 found_anew(vec4 x, uint of_turn) {
+    return uintBitsToFloat(floatBitsToUint(x) ^ zero_of(of_turn));
+}
 #endif

@@ -195,12 +195,13 @@ vec3 visibility(vec3 p, vec3 n, vec3 v, uint source_face, uvec4 media, inout vec
         bool found = !blocked && filters.triangles.x != NO_TRIANGLE;
         do {
             if (found) {
-                Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
                 float length_of_direction = vector_length(to_light);
                 uint medium = present_medium(media);
                 if (ABSORPTION == ABSORPTION_PATH && medium != 0) {
-                    through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (hit.t - last.t) * length_of_direction);
+                    through *= absorbed(medium, origin + to_light * last.t, to_light / length_of_direction, (filters.t.x - last.t) * length_of_direction);
                 }
+                // After the medium: else the triangle would be kept while that is integrated.
+                Hit hit = hit_again(origin, to_light, filters.t.x, filters.triangles.x);
                 through *= filtered(hit_point_of(hit, origin, to_light), to_light / length_of_direction, ambient, media);
                 last = hit;
             }
