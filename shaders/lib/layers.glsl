@@ -303,21 +303,28 @@ struct Layers {
     vec4 shares;       // selection probabilities of coat, base, diffuse base layer, transmission for paths; their sum is 1, or 0
 };
 
-// The layers in one turn of a loop over lights: numbers that follow from F0 and from the albedo of the lobe are computed in it,
-// and take no registers while shadow rays are traced.
+// A surface found anew: what follows from its directions, roughness and indices is computed in a turn of a loop over lights, or again
+// after it, and takes no registers while shadow rays are traced.
+Surface found_anew(Surface s, uint of_turn) {
+    Surface r = s;
+    r.n = found_anew(s.n, of_turn);
+    r.v = found_anew(s.v, of_turn);
+    r.metallic = found_anew(s.metallic, of_turn);
+    r.f0_dielectric = found_anew(s.f0_dielectric, of_turn);
+    r.f0_metal = found_anew(s.f0_metal, of_turn);
+    r.ior = found_anew(s.ior, of_turn);
+    r.lobe = found_anew(s.lobe, of_turn);
+    r.alpha = found_anew(s.alpha, of_turn);
+    r.alpha_along = found_anew(s.alpha_along, of_turn);
+    r.film = found_anew(s.film, of_turn);
+    r.clearcoat_alpha = found_anew(s.clearcoat_alpha, of_turn);
+    r.sheen = found_anew(s.sheen, of_turn);
+    return r;
+}
+
+// The layers in one turn of a loop over lights.
 Layers in_turn(Layers b, uint of_turn) {
-    b.s.f0_dielectric = found_anew(b.s.f0_dielectric, of_turn);
-    b.s.f0_metal = found_anew(b.s.f0_metal, of_turn);
-    b.s.metallic = found_anew(b.s.metallic, of_turn);
-    b.s.lobe = found_anew(b.s.lobe, of_turn);
-    b.s.n = found_anew(b.s.n, of_turn);
-    b.s.v = found_anew(b.s.v, of_turn);
-    b.s.alpha = found_anew(b.s.alpha, of_turn);
-    b.s.alpha_along = found_anew(b.s.alpha_along, of_turn);
-    b.s.clearcoat_alpha = found_anew(b.s.clearcoat_alpha, of_turn);
-    b.s.film = found_anew(b.s.film, of_turn);
-    b.s.sheen = found_anew(b.s.sheen, of_turn);
-    b.s.ior = found_anew(b.s.ior, of_turn);
+    b.s = found_anew(b.s, of_turn);
     b.n1 = found_anew(b.n1, of_turn);
     b.n2 = found_anew(b.n2, of_turn);
     b.cos_v = found_anew(b.cos_v, of_turn);
@@ -537,6 +544,14 @@ BsdfEval evaluate_reflection(Layers b, vec3 l) {
         if (b.coat_delta) {
             r.f_cos *= b.under;
         } else {
+#ifndef ONE_KERNEL
+            // Not the halves of directions that the base's compensated products needed: they would be kept until here. For the
+            // kernels of CPUs, which would change nothing, glslang needs more than 3 GB with these lines.
+            uint base_known = floatBitsToUint(abs(r.f_cos.x));
+            l = found_anew(l, base_known);
+            s.v = found_anew(s.v, base_known);
+            sum.hi = found_anew(sum.hi, base_known);
+#endif
             HalfAngle h = half_angle(s.n_coat, sum);
             float f = fresnel_of_coat(s, h.cos_d);
             float coat_l = max(cosine(s.n_coat, l), 0.0);

@@ -73,7 +73,7 @@ SkyShown sky_shown = NOTHING_SHOWN;
 // it is a ray of ambient occlusion, which adds to `sky_shown` instead.
 vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, uint surface) {
     Surface s = b.s;
-    vec3 p_rel = LIT_AT_HITS ? s.p_bvh - trace_terms.bvh_from_rel : s.p_rel;
+    vec3 p_rel = LIT_AT_HITS ? found_anew(s.p_bvh, index) - trace_terms.bvh_from_rel : s.p_rel;
     PunctualLight light = punctual_light_at(is_sample || is_sky ? 0u : index, p_rel);
     if (LIGHT_SAMPLES > 0) {
         if (is_sample) {

@@ -123,6 +123,8 @@ void main() {
         s.lobe = lobe_reflectance(s);
         vec3 shown = radiance_to_eye(s, pixel, surface, tiles_across, all, true);
         // Screen-space reflection for the nearest fragment alone: a ray may march as many steps as the picture is wide.
+        // What the lookup of the environment has computed is not kept while lights are summed.
+        s = found_anew(s, floatBitsToUint(abs(shown.x)));
         if (MIRRORS) shown = not_negative(shown + mirrored_on_screen(s, surface == FIRST_FRAGMENT));
         surface++;
         // 6. Composite front to back.

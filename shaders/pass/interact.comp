@@ -6,6 +6,8 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 8, local_size_y = 8) in;
+// A kernel of CPUs alone (lib/layers.glsl).
+#define ONE_KERNEL
 #include "lib/ray_tree.glsl"
 #include "lib/work_tile.glsl"
 

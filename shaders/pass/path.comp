@@ -6,6 +6,8 @@
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 layout(local_size_x = 64) in;
+// A kernel of CPUs alone (lib/layers.glsl).
+#define ONE_KERNEL
 #include "lib/path_pair.glsl"
 #include "lib/path_state.glsl"
 #include "lib/queue.glsl"
