@@ -74,6 +74,37 @@ fn shapes_that_bound_a_volume_are_closed() {
     assert!(!is_closed(&Mesh::default()), "nothing bounds nothing");
 }
 
+/// A sphere as it is often generated: its seam ends at the sine of 2π, and its poles are rings of the sine of 0 and π.
+fn turned_by_sines(radius: f32, sides: u32, rings: u32) -> Mesh {
+    let mut made = Mesh { name: "turned".to_owned(), ..Mesh::default() };
+    for ring in 0..=rings {
+        let polar = std::f32::consts::PI * ring as f32 / rings as f32;
+        for side in 0..=sides {
+            let turn = std::f32::consts::TAU * side as f32 / sides as f32;
+            let n = [polar.sin() * turn.sin(), polar.cos(), polar.sin() * turn.cos()];
+            made.positions.push(n.map(|x| x * radius));
+            made.normals.push(n);
+            if ring < rings && side < sides {
+                let [a, b] = [ring, ring + 1].map(|ring| ring * (sides + 1) + side);
+                made.indices.extend([a, b, a + 1, a + 1, b, b + 1]);
+            }
+        }
+    }
+    made
+}
+
+#[test]
+fn seams_within_rounding_are_closed() {
+    for (radius, sides, rings) in [(1.0, 24, 12), (0.003, 48, 24), (250.0, 7, 5), (1.0, 500, 300)] {
+        let made = turned_by_sines(radius, sides, rings);
+        let [first, last] = [0, sides].map(|side| made.positions[(sides + 1 + side) as usize]);
+        assert_ne!(first, last, "the seam has a gap");
+        let found = solids(&scene_of(vec![(made, DAffine3::IDENTITY)]));
+        assert_eq!((found.solid, found.flipped), (vec![true], vec![false]), "{radius} {sides} {rings}");
+        assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    }
+}
+
 #[test]
 fn one_flaw_opens_a_mesh_and_what_is_none_does_not() {
     let ball = || mesh("ball", Shape::sphere(1.0, 12));
@@ -87,8 +118,11 @@ fn one_flaw_opens_a_mesh_and_what_is_none_does_not() {
     let mut flaw = ball();
     // Twelve rings of 25: the first and the last of a ring are the two sides of the seam.
     assert_eq!(flaw.positions[75], flaw.positions[99]);
-    flaw.positions[75][0] = flaw.positions[75][0].next_up();
-    assert!(!is_closed(&flaw), "one copy of a shared corner is off by its last bit");
+    let x = flaw.positions[75][0];
+    flaw.positions[75][0] = x.next_up();
+    assert!(is_closed(&flaw), "one copy of a shared corner is off by its last bit");
+    flaw.positions[75][0] = x + 1e-5;
+    assert!(!is_closed(&flaw), "one copy is off by 5e-6 of the diameter");
 
     assert!(is_closed(&turned(ball())), "inside out is closed");
     let mut sound = ball();

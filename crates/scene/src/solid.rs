@@ -15,6 +15,10 @@ use super::{AlphaMode, Bounds, Instance, Material, Mesh, Scene};
 /// triangles has errors of 1e-16 each.
 const NO_VOLUME: f64 = 1e-12;
 
+/// Open edges whose ends are closer than this fraction of a mesh's size meet in a seam: the sine of 2π, where a turned
+/// surface should end at its beginning, is 2e-16 in f64 and 2e-7 in f32.
+const SEAM: f64 = 1e-6;
+
 /// Solids and thin-walled surfaces among the instances of a scene; each list has one entry per instance, `medium` one
 /// per material.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -40,12 +44,54 @@ pub struct Solids {
 /// Whether a mesh is closed (watertight): every directed edge occurs as often as the opposite one.
 ///
 /// Vertices are welded by position, to the last bit (−0 equals 0), because seams of normals and texture coordinates
-/// duplicate vertices without a gap. Triangles with two corners in one place are ignored. The mesh need not be
-/// manifold: surfaces may touch or cross themselves, and several may form one mesh. A mesh without triangles is not
-/// closed.
+/// duplicate vertices without a gap; edges that are open then, within a millionth of the mesh's size. Triangles with two
+/// corners in one place are ignored. The mesh need not be manifold: surfaces may touch or cross themselves, and several
+/// may form one mesh. A mesh without triangles is not closed.
 #[must_use]
 pub fn is_closed(mesh: &Mesh) -> bool {
-    mesh.indices.as_chunks::<3>().0.iter().any(|&[a, b, c]| a != b && b != c && c != a) && rim(mesh).is_empty()
+    let has_triangles = mesh.indices.as_chunks::<3>().0.iter().any(|&[a, b, c]| a != b && b != c && c != a);
+    has_triangles && closes_at_seams(mesh, rim(mesh))
+}
+
+/// Whether the open edges of a mesh cancel where ends within [`SEAM`] are one vertex.
+fn closes_at_seams(mesh: &Mesh, rim: HashMap<Edge, i64>) -> bool {
+    if rim.is_empty() {
+        return true;
+    }
+    let all = || mesh.positions.iter().map(|&p| Vec3::from(p).as_dvec3());
+    let size = all().fold(DVec3::NEG_INFINITY, DVec3::max) - all().fold(DVec3::INFINITY, DVec3::min);
+    let reach = SEAM * size.max_element();
+    if !(reach > 0.0 && reach.is_finite()) {
+        return false;
+    }
+    // The first vertex of a place stands for those within reach of it: it is in their cell or beside it.
+    let mut ends: Vec<[u32; 3]> = rim.keys().flatten().copied().collect();
+    ends.sort_unstable();
+    ends.dedup();
+    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    let mut places: Vec<DVec3> = Vec::new();
+    let mut place_of: HashMap<[u32; 3], usize> = HashMap::new();
+    for end in ends {
+        let p = Vec3::from(end.map(f32::from_bits)).as_dvec3();
+        let cell = (p / reach).floor().to_array().map(|x| x as i64);
+        let beside = (0..27).map(|i| [cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1]);
+        let known =
+            beside.filter_map(|cell| cells.get(&cell)).flatten().copied().find(|&i| places[i].distance(p) <= reach);
+        place_of.insert(
+            end,
+            known.unwrap_or_else(|| {
+                places.push(p);
+                cells.entry(cell).or_default().push(places.len() - 1);
+                places.len() - 1
+            }),
+        );
+    }
+    let mut open: HashMap<[usize; 2], i64> = HashMap::new();
+    for (edge, count) in rim {
+        let [p, q] = edge.map(|end| place_of[&end]);
+        *open.entry([p.min(q), p.max(q)]).or_default() += if p < q { count } else { -count };
+    }
+    open.iter().all(|([p, q], &count)| p == q || count == 0)
 }
 
 /// A directed edge: the bits of both ends, the smaller first.
