@@ -40,6 +40,11 @@ const NEAREST_LAMP: f64 = 0.01;
 const MOST_PASSED: u32 = 32;
 /// Coefficients: the mean, what the cube's six sides have beside it, the slopes by place and by the occluded share.
 const TERMS: usize = 11;
+/// A ray whose radiosity is off the fit by more than this times the mean counts by the distance, no longer by its square
+/// (Huber 1964): the few that end beside a lamp would bend the function for the whole scene.
+const FAR_OFF: f64 = 16.0;
+/// Fits, each with the weights of the one before (iteratively reweighted least squares).
+const FITS: usize = 8;
 /// The ridge of the least squares, in parts of the number of rays and in rays: few rays give a constant.
 const RIDGE: [f64; 2] = [0.02, 10.0];
 
@@ -126,22 +131,33 @@ impl OccluderRadiosity {
         (self.by_place * place + by_direction + self.by_share * occluded).max(DVec3::ZERO)
     }
 
-    /// The ridge regression: (FᵀF + ridge) β = FᵀB for the features F of all rays. The mean has no ridge. Places count
-    /// in units of the largest one.
+    /// The function of all rays, in which those far off count less.
     fn fitted(sent: &[Sent]) -> Self {
+        let far_off = FAR_OFF * sent.iter().map(|ray| ray.radiosity.length()).sum::<f64>() / sent.len() as f64;
+        if sent.is_empty() || far_off == 0.0 {
+            return Self::ZERO;
+        }
+        let first = Self::weighted(sent, &vec![1.0; sent.len()]);
+        (1..FITS).fold(first, |fit, _| {
+            let off = |ray: &Sent| (fit.at(ray.from, squares(ray.direction), ray.occluded) - ray.radiosity).length();
+            let weights: Vec<f64> = sent.iter().map(|ray| far_off / off(ray).max(far_off)).collect();
+            Self::weighted(sent, &weights)
+        })
+    }
+
+    /// The ridge regression: (FᵀWF + ridge) β = FᵀWB for the features F of all rays and their weights W. The mean has no
+    /// ridge. Places count in units of the largest one.
+    fn weighted(sent: &[Sent], weights: &[f64]) -> Self {
         let unit = sent.iter().map(|ray| ray.from.length()).fold(f64::MIN_POSITIVE, f64::max);
         let mut rows = [[0.0; TERMS + 3]; TERMS];
-        for ray in sent {
+        for (ray, &weight) in sent.iter().zip(weights) {
             let ([along, against], p, b) = (squares(ray.direction), ray.from / unit, ray.radiosity.to_array());
             let features =
                 [1.0, along.x, along.y, along.z, against.x, against.y, against.z, p.x, p.y, p.z, ray.occluded - 0.5];
             for (row, feature) in rows.iter_mut().zip(features) {
                 let products = features.into_iter().chain(b);
-                row.iter_mut().zip(products).for_each(|(sum, product)| *sum += feature * product);
+                row.iter_mut().zip(products).for_each(|(sum, product)| *sum += weight * feature * product);
             }
-        }
-        if sent.is_empty() {
-            return Self::ZERO;
         }
         for (i, row) in rows.iter_mut().enumerate().skip(1) {
             row[i] += RIDGE[0] * sent.len() as f64 + RIDGE[1];

@@ -86,6 +86,11 @@ fn basin(b: &mut StudyBuilder) {
     b.add("water", Shape::lathe(&body, 96), water, at(0.42, 0.0001, 0.0, 0.0));
 }
 
+/// An emitter and its proxy light are the same lamp: radiance times the area that its front shows is the intensity.
+fn emitter_of(b: &mut StudyBuilder, name: &str, intensity: [f32; 3], area: f64) -> usize {
+    b.material(emitter(name, intensity.map(|i| i / area as f32)))
+}
+
 /// An emissive ball on a thin stand. Its proxy light hangs below the ball, because the ball would shadow a light inside
 /// it. Its range ends before the backdrop, where the ball's shadow would be visible.
 fn lamp(b: &mut StudyBuilder) {
@@ -100,21 +105,24 @@ fn lamp(b: &mut StudyBuilder) {
         line(p(0.006, height - radius + 0.004), p(0.0, height - radius + 0.004)),
     ];
     b.add("lamp stand", Shape::lathe(&stand, 48), brass, at(x, 0.0001, z, 0.0));
-    let glow = b.material(emitter("lamp glow", [14.0, 8.4, 3.6]));
+    let intensity = [0.60, 0.36, 0.15];
+    let glow = emitter_of(b, "lamp glow", intensity, std::f64::consts::PI * radius * radius);
     b.add("lamp ball", Shape::sphere(radius, 32), glow, at(x, height, z, 0.0));
     let position = DVec3::new(x - 0.02, height - 0.06, z + 0.035);
-    b.proxy("lamp", [0.60, 0.36, 0.15], LightKind::Point { position, range: Some(1.1) });
+    b.proxy("lamp", intensity, LightKind::Point { position, range: Some(1.1) });
 }
 
 /// Two soft boxes for highlights on glass and metal, with their proxy lights.
 fn studio(b: &mut StudyBuilder) {
     let middle = DVec3::new(0.0, 0.15, 0.0);
-    let key = b.material(emitter("key soft box", [5.0, 5.0, 5.0]));
+    let (width, height, intensity) = (0.9, 0.6, [15.0; 3]);
+    let key = emitter_of(b, "key soft box", intensity, width * height);
     let key_at = DVec3::new(-1.5, 1.7, 0.7);
-    b.add("key soft box", Shape::panel(0.9, 0.6), key, facing(key_at, middle - key_at));
-    let rim = b.material(emitter("rim soft box", [2.0, 2.3, 2.8]));
+    b.add("key soft box", Shape::panel(width, height), key, facing(key_at, middle - key_at));
+    let (width, height, fill) = (0.25, 1.2, [1.3, 1.5, 1.8]);
+    let rim = emitter_of(b, "rim soft box", fill, width * height);
     let rim_at = DVec3::new(1.7, 0.9, 0.5);
-    b.add("rim soft box", Shape::panel(0.25, 1.2), rim, facing(rim_at, middle - rim_at));
+    b.add("rim soft box", Shape::panel(width, height), rim, facing(rim_at, middle - rim_at));
 
     let direction = (middle - key_at).normalize();
     let kind = LightKind::Spot {
@@ -125,7 +133,7 @@ fn studio(b: &mut StudyBuilder) {
         inner: 30.0_f64.to_radians(),
         outer: 62.0_f64.to_radians(),
     };
-    b.proxy("key", [15.0, 15.0, 15.0], kind);
+    b.proxy("key", intensity, kind);
     let position = rim_at + (middle - rim_at).normalize() * 0.05;
-    b.proxy("fill", [1.3, 1.5, 1.8], LightKind::Point { position, range: None });
+    b.proxy("fill", fill, LightKind::Point { position, range: None });
 }
