@@ -347,8 +347,8 @@ fn what_stands_on_a_large_ground_is_found() {
     assert!(below > 1.2 && below < 0.6 * std::f64::consts::PI, "{below}");
 }
 
-/// The few surfaces beside a lamp, which are brighter than all others by far, do not bend the function for the whole scene:
-/// the basin of study:etalon is blue. Truth is path tracing.
+/// The few surfaces beside a lamp, which are brighter than all others by far, do not bend the function for the whole
+/// scene: the basin of study:etalon is blue. Truth is path tracing.
 #[test]
 fn surfaces_beside_a_lamp_do_not_count_for_all() {
     let gpu = Gpu::open();

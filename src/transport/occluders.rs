@@ -40,8 +40,8 @@ const NEAREST_LAMP: f64 = 0.01;
 const MOST_PASSED: u32 = 32;
 /// Coefficients: the mean, what the cube's six sides have beside it, the slopes by place and by the occluded share.
 const TERMS: usize = 11;
-/// A ray whose radiosity is off the fit by more than this times the mean counts by the distance, no longer by its square
-/// (Huber 1964): the few that end beside a lamp would bend the function for the whole scene.
+/// A ray whose radiosity is off the fit by more than this times the mean counts by the distance, no longer by its
+/// square (Huber 1964): the few that end beside a lamp would bend the function for the whole scene.
 const FAR_OFF: f64 = 16.0;
 /// Fits, each with the weights of the one before (iteratively reweighted least squares).
 const FITS: usize = 8;
@@ -145,8 +145,8 @@ impl OccluderRadiosity {
         })
     }
 
-    /// The ridge regression: (FᵀWF + ridge) β = FᵀWB for the features F of all rays and their weights W. The mean has no
-    /// ridge. Places count in units of the largest one.
+    /// The ridge regression: (FᵀWF + ridge) β = FᵀWB for the features F of all rays and their weights W. The mean has
+    /// no ridge. Places count in units of the largest one.
     fn weighted(sent: &[Sent], weights: &[f64]) -> Self {
         let unit = sent.iter().map(|ray| ray.from.length()).fold(f64::MIN_POSITIVE, f64::max);
         let mut rows = [[0.0; TERMS + 3]; TERMS];

@@ -44,9 +44,9 @@ pub struct Solids {
 /// Whether a mesh is closed (watertight): every directed edge occurs as often as the opposite one.
 ///
 /// Vertices are welded by position, to the last bit (−0 equals 0), because seams of normals and texture coordinates
-/// duplicate vertices without a gap; edges that are open then, within a millionth of the mesh's size. Triangles with two
-/// corners in one place are ignored. The mesh need not be manifold: surfaces may touch or cross themselves, and several
-/// may form one mesh. A mesh without triangles is not closed.
+/// duplicate vertices without a gap; edges that are open then, within a millionth of the mesh's size. Triangles with
+/// two corners in one place are ignored. The mesh need not be manifold: surfaces may touch or cross themselves, and
+/// several may form one mesh. A mesh without triangles is not closed.
 #[must_use]
 pub fn is_closed(mesh: &Mesh) -> bool {
     let has_triangles = mesh.indices.as_chunks::<3>().0.iter().any(|&[a, b, c]| a != b && b != c && c != a);
