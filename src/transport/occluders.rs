@@ -137,12 +137,17 @@ impl OccluderRadiosity {
         if sent.is_empty() || far_off == 0.0 {
             return Self::ZERO;
         }
-        let first = Self::weighted(sent, &vec![1.0; sent.len()]);
-        (1..FITS).fold(first, |fit, _| {
+        let mut weights = vec![1.0; sent.len()];
+        let mut fit = Self::weighted(sent, &weights);
+        for _ in 1..FITS {
             let off = |ray: &Sent| (fit.at(ray.from, squares(ray.direction), ray.occluded) - ray.radiosity).length();
-            let weights: Vec<f64> = sent.iter().map(|ray| far_off / off(ray).max(far_off)).collect();
-            Self::weighted(sent, &weights)
-        })
+            weights = sent.iter().map(|ray| far_off / off(ray).max(far_off)).collect();
+            if weights.iter().all(|&weight| weight == 1.0) {
+                break;
+            }
+            fit = Self::weighted(sent, &weights);
+        }
+        fit
     }
 
     /// The ridge regression: (FᵀWF + ridge) β = FᵀWB for the features F of all rays and their weights W. The mean has
