@@ -36,20 +36,23 @@ fn knobs(model: Model, choices: &[&str]) -> Knobs {
 fn are_the_same(settings: &Settings, names: &[&str]) {
     let gpu = Gpu::hasty();
     for name in names {
-        let scene = study::load(name).expect("a scene");
-        let draw = |architecture| draw(&gpu, &scene, settings, architecture);
-        let [(cpu, of_cpu), (gpu, of_gpu)] = [Architecture::Cpu, Architecture::Gpu].map(draw);
-        for (a, b) in of_cpu.iter().zip(&of_gpu) {
-            let different = bits(a).iter().zip(bits(b)).filter(|(a, b)| *a != b).count();
-            assert_eq!(different, 0, "{name}: pixels that differ");
-        }
-        let counts = |w: Work| {
-            ([w.reflection, w.refraction, w.shadow, w.indirect, w.unmatched_exits, w.not_finite], w.most_lost)
-        };
-        assert_eq!(counts(cpu.work), counts(gpu.work), "{name}: rays, exits and the largest loss");
-        // Each invocation rounds its loss up to a step, and of two paths together it is one loss.
-        assert!(cpu.work.lost.abs_diff(gpu.work.lost) <= gpu.work.indirect, "{name}: {:?} {:?}", cpu.work, gpu.work);
+        is_the_same(&gpu, settings, study::load(name).expect("a scene"));
     }
+}
+
+fn is_the_same(gpu: &Gpu, settings: &Settings, scene: Scene) {
+    let name = &scene.name;
+    let draw = |architecture| draw(gpu, &scene, settings, architecture);
+    let [(cpu, of_cpu), (gpu, of_gpu)] = [Architecture::Cpu, Architecture::Gpu].map(draw);
+    for (a, b) in of_cpu.iter().zip(&of_gpu) {
+        let different = bits(a).iter().zip(bits(b)).filter(|(a, b)| *a != b).count();
+        assert_eq!(different, 0, "{name}: pixels that differ");
+    }
+    let counts =
+        |w: Work| ([w.reflection, w.refraction, w.shadow, w.indirect, w.unmatched_exits, w.not_finite], w.most_lost);
+    assert_eq!(counts(cpu.work), counts(gpu.work), "{name}: rays, exits and the largest loss");
+    // Each invocation rounds its loss up to a step, and of two paths together it is one loss.
+    assert!(cpu.work.lost.abs_diff(gpu.work.lost) <= gpu.work.indirect, "{name}: {:?} {:?}", cpu.work, gpu.work);
 }
 
 fn settings(model: Model, choices: &[&str]) -> Settings {
@@ -78,6 +81,18 @@ fn by_rays_are_the_same(settings: &Settings, names: &[&str]) {
 #[test]
 fn by_rays() {
     by_rays_are_the_same(&settings(Model::Recursive, &["samples=1"]), &SCENES);
+}
+
+/// An unlit surface in mirrors and glass, to which no form sends rays for light.
+#[test]
+fn by_rays_with_an_unlit_floor() {
+    let gpu = Gpu::hasty();
+    let mut scene = study::load("etalon").expect("a scene");
+    let floor = scene.materials.iter_mut().find(|m| m.name == "table").expect("the floor");
+    floor.unlit = true;
+    if gpu.device.is_software() {
+        is_the_same(&gpu, &settings(Model::Recursive, &["samples=1"]), scene);
+    }
 }
 
 /// Far fewer ray trees than pixels: complete trees make room for those of other pixels, many times.

@@ -105,6 +105,17 @@ fn seams_within_rounding_are_closed() {
     }
 }
 
+/// The front and the back of a pane, wound outwards, so near that their edges meet: they are sheets.
+#[test]
+fn two_sheets_within_rounding_bound_nothing() {
+    let [mut pane, back] = [Shape::panel(1.0, 1.0), Shape::panel(1.0, 1.0)].map(|shape| mesh("pane", shape));
+    let count = pane.positions.len() as u32;
+    pane.positions.extend(back.positions.iter().map(|&[x, y, _]| [x, y, -2e-7]));
+    pane.normals.extend(back.normals.iter().map(|n| n.map(|x| -x)));
+    pane.indices.extend(turned(back).indices.iter().map(|i| i + count));
+    assert!(!is_closed(&pane));
+}
+
 #[test]
 fn one_flaw_opens_a_mesh_and_what_is_none_does_not() {
     let ball = || mesh("ball", Shape::sphere(1.0, 12));

@@ -70,7 +70,7 @@ SkyRay sky_ray(Surface s, uint i) {
     r.sky = sky_directions[trace_terms.sample_index * SAMPLE_DIRECTIONS + FIRST_DIRECTION + sky_list * OCCLUSION_RAYS + i];
     bool shines_through = DIFFUSE_TRANSMISSION && largest(s.diffuse_through) > 0.0;
     r.side = shines_through && dot(s.n_triangle, r.sky.direction) < 0.0 ? -1.0 : 1.0;
-    r.cos_l = dot(s.n_triangle, r.sky.direction) * r.side > 0.0 ? max(dot(s.n, r.sky.direction) * r.side, 0.0) : 0.0;
+    r.cos_l = !s.unlit && dot(s.n_triangle, r.sky.direction) * r.side > 0.0 ? max(dot(s.n, r.sky.direction) * r.side, 0.0) : 0.0;
     return r;
 }
 
@@ -134,7 +134,8 @@ SkyShown shown_to(Surface s) {
     for (uint i = 0; i < OCCLUSION_RAYS && loop_iterations < LOOP_BUDGET; i++) {
         SkyRay r = sky_ray(s, i);
         vec3 n = s.n_triangle * r.side;
-        show(shown, r, visibility(s.p_bvh, n, free_side(s, r), s.face, s.media, r.sky.direction, LARGEST, true, r.cos_l > 0.0));
+        vec3 visible = visibility(s.p_bvh, n, free_side(s, r), s.face, s.media, r.sky.direction, LARGEST, true, r.cos_l > 0.0);
+        show(shown, r, visible);
     }
     return shown;
 }
@@ -175,7 +176,7 @@ LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
         vec3 h = half_vector(around, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
         vec3 r = reflect_ray(-s.v, h).R;
         float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
-        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0);
+        vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0 && !s.unlit);
         vec3 light = prefiltered_radiance(r, 0.5 * alpha) * weight;
         seen += light * visible;
         all_light += light;

@@ -4,7 +4,7 @@
 //! docs/decisions/ambient-occlusion.md. Paths start on surfaces, by the cosine as light arrives there, and
 //! take all surfaces to be diffuse. What the first ray meets sends the radiosity B, from lamps and from the
 //! environment, over any number of surfaces. An ambient cube (McTaggart 2004, "Half-Life 2 / Valve Source
-//! Shading") with slopes by place and by the occluded share is fitted to B by least squares. It is the same for
+//! Shading") with slopes by place and by the occluded share is fitted to B by robust least squares. It is the same for
 //! every device, traversal and camera.
 
 use std::array::from_fn;
@@ -111,7 +111,10 @@ impl OccluderRadiosity {
             .into_par_iter()
             .filter_map(|i| {
                 let at = (i as f64 + 0.5) / POINTS as f64 * sum;
-                Some(lit.arriving(bvh.triangles.get(chosen.partition_point(|&up_to| up_to <= at))?, i))
+                let which = chosen.partition_point(|&up_to| up_to <= at);
+                let by_area = areas.get(which)? / total;
+                let of_area = by_area / (0.5 * by_area + 0.5 / areas.len() as f64);
+                Some(lit.arriving(&bvh.triangles[which], i, of_area))
             })
             .collect();
         Self::fitted(&found.concat())
@@ -131,7 +134,8 @@ impl OccluderRadiosity {
         (self.by_place * place + by_direction + self.by_share * occluded).max(DVec3::ZERO)
     }
 
-    /// The function of all rays, in which those far off count less.
+    /// The function of all rays, in which those far off count less. By area it has no less light than they: a patch of
+    /// sun in a room is far off, and all the light that there is.
     fn fitted(sent: &[Sent]) -> Self {
         let far_off = FAR_OFF * sent.iter().map(|ray| ray.radiosity.length()).sum::<f64>() / sent.len() as f64;
         if sent.is_empty() || far_off == 0.0 {
@@ -143,11 +147,20 @@ impl OccluderRadiosity {
             let off = |ray: &Sent| (fit.at(ray.from, squares(ray.direction), ray.occluded) - ray.radiosity).length();
             weights = sent.iter().map(|ray| far_off / off(ray).max(far_off)).collect();
             if weights.iter().all(|&weight| weight == 1.0) {
-                break;
+                return fit;
             }
             fit = Self::weighted(sent, &weights);
         }
-        fit
+        let by_area = |of: &dyn Fn(&Sent) -> DVec3| sent.iter().map(|ray| of(ray) * ray.of_area).sum::<DVec3>();
+        let has = by_area(&|ray| fit.at(ray.from, squares(ray.direction), ray.occluded));
+        let lacks = by_area(&|ray| ray.radiosity) / has.max(DVec3::splat(f64::MIN_POSITIVE));
+        fit.scaled(lacks.max(DVec3::ONE))
+    }
+
+    fn scaled(&self, by: DVec3) -> Self {
+        let by_channel = DMat3::from_diagonal(by);
+        let [along, against, by_place] = [self.along, self.against, self.by_place].map(|of| by_channel * of);
+        Self { along, against, by_place, by_share: self.by_share * by }
     }
 
     /// The ridge regression: (FᵀWF + ridge) β = FᵀWB for the features F of all rays and their weights W. The mean has
@@ -203,6 +216,8 @@ struct Sent {
     radiosity: DVec3,
     /// The share of all rays from there that meet something.
     occluded: f64,
+    /// The density of points by area alone over that of the points here.
+    of_area: f64,
 }
 
 /// A point that a ray meets.
@@ -229,7 +244,7 @@ struct LitScene<'a> {
 impl LitScene<'_> {
     /// What arrives at point `number`, which lies on the triangle. Places and directions are those of R sequences
     /// (Roberts 2018).
-    fn arriving(&self, triangle: &Triangle, number: usize) -> Vec<Sent> {
+    fn arriving(&self, triangle: &Triangle, number: usize, of_area: f64) -> Vec<Sent> {
         // The root of x³ = x + 1.
         const STEP: f64 = 1.324_717_957_244_746;
         let sequence = |i: usize| [1, 2].map(|power| (0.5 + (i as f64 + 1.0) * STEP.powi(-power)).fract());
@@ -250,7 +265,7 @@ impl LitScene<'_> {
                 let numbers = sequence(i);
                 let direction = by_cosine(n, (numbers[0] + turn[0]).fract(), (numbers[1] + turn[1]).fract());
                 let met = self.meet(from, direction, &mut random)?;
-                Some(Sent { from, direction, radiosity: self.radiosity(met, &mut random), occluded: 0.0 })
+                Some(Sent { from, direction, radiosity: self.radiosity(met, &mut random), occluded: 0.0, of_area })
             })
             .collect();
         let occluded = sent.len() as f64 / PATHS as f64;

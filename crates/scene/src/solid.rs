@@ -59,9 +59,10 @@ fn closes_at_seams(mesh: &Mesh, rim: HashMap<Edge, i64>) -> bool {
         return true;
     }
     let all = || mesh.positions.iter().map(|&p| Vec3::from(p).as_dvec3());
-    let size = all().fold(DVec3::NEG_INFINITY, DVec3::max) - all().fold(DVec3::INFINITY, DVec3::min);
-    let reach = SEAM * size.max_element();
-    if !(reach > 0.0 && reach.is_finite()) {
+    let least = all().fold(DVec3::INFINITY, DVec3::min);
+    let reach = SEAM * (all().fold(DVec3::NEG_INFINITY, DVec3::max) - least).max_element();
+    // Two sheets as near to each other as the ends of a seam bound nothing either.
+    if !(reach > 0.0 && reach.is_finite()) || signed_volume(&[mesh]).abs() <= 4.0 * reach * area(mesh) {
         return false;
     }
     // The first vertex of a place stands for those within reach of it: it is in their cell or beside it.
@@ -73,7 +74,7 @@ fn closes_at_seams(mesh: &Mesh, rim: HashMap<Edge, i64>) -> bool {
     let mut place_of: HashMap<[u32; 3], usize> = HashMap::new();
     for end in ends {
         let p = Vec3::from(end.map(f32::from_bits)).as_dvec3();
-        let cell = (p / reach).floor().to_array().map(|x| x as i64);
+        let cell = ((p - least) / reach).floor().to_array().map(|x| x as i64);
         let beside = (0..27).map(|i| [cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1]);
         let known =
             beside.filter_map(|cell| cells.get(&cell)).flatten().copied().find(|&i| places[i].distance(p) <= reach);
