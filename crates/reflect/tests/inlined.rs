@@ -5,8 +5,8 @@ use std::path::Path;
 
 /// The largest stage, `path.comp`, has 240 thousand; with each call written out it had 418.
 const LARGEST: usize = 240_000;
-/// All together have 1,514 thousand; they had 2,508.
-const TOGETHER: usize = 1_514_000;
+/// All together have 1,517 thousand, 3 of them for what GPUs find anew; they had 2,508.
+const TOGETHER: usize = 1_517_500;
 
 #[test]
 fn formulas_stand_once_in_a_kernel() {
