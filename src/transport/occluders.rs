@@ -45,6 +45,8 @@ const TERMS: usize = 11;
 const FAR_OFF: f64 = 16.0;
 /// Fits, each with the weights of the one before (iteratively reweighted least squares).
 const FITS: usize = 8;
+/// The largest factor by which such a fit is scaled up: where all of the light is far off, no fit has it.
+const MOST_SCALED: f64 = 4.0;
 /// The ridge of the least squares, in parts of the number of rays and in rays: few rays give a constant.
 const RIDGE: [f64; 2] = [0.02, 10.0];
 
@@ -154,7 +156,7 @@ impl OccluderRadiosity {
         let by_area = |of: &dyn Fn(&Sent) -> DVec3| sent.iter().map(|ray| of(ray) * ray.of_area).sum::<DVec3>();
         let has = by_area(&|ray| fit.at(ray.from, squares(ray.direction), ray.occluded));
         let lacks = by_area(&|ray| ray.radiosity) / has.max(DVec3::splat(f64::MIN_POSITIVE));
-        fit.scaled(lacks.max(DVec3::ONE))
+        fit.scaled(lacks.clamp(DVec3::ONE, DVec3::splat(MOST_SCALED)))
     }
 
     fn scaled(&self, by: DVec3) -> Self {
