@@ -463,7 +463,7 @@ impl Renderer {
         // uncorrelated and partly cancels in the sum.
         let [at, half] = [index / self.halves(), index % self.halves()];
         let seed = self.settings.seed.wrapping_mul(2).wrapping_add(half).wrapping_add(band.wrapping_mul(0x9e37_79b9));
-        self.rays.set_view(view, at, count, seed);
+        self.rays.set_view(view, [at, count.div_ceil(self.halves())], count, seed);
     }
 
     /// Number of parts of each band in pictures with dispersion, a power of two: one for each sample of a half up to a

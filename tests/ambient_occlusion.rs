@@ -43,6 +43,18 @@ fn film(gpu: &Gpu, scene: &Scene, environment: &Environment, size: [u32; 2], cho
     gpu.shot(scene, Some(environment), Settings { knobs: knobs(&choices), ..settings(size) }).1
 }
 
+/// The list of directions of a pixel: each square of 4x4 has all 16, in an order of its own (`list_of` in the shader).
+fn list_of(x: usize, y: usize) -> usize {
+    let pcg = |x: u32| {
+        let state = x.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+        let word = (state >> ((state >> 28) + 4) ^ state).wrapping_mul(277_803_737);
+        word >> 22 ^ word
+    };
+    let [square_x, square_y] = [x / 4, y / 4].map(|at| at as u32);
+    let order = pcg(square_x.wrapping_add(pcg(square_y.wrapping_add(pcg(0x402)))));
+    (y % 4 * 4 + x % 4) ^ (order & 15) as usize
+}
+
 /// A floor with three panels that stand on it.
 fn panels() -> Scene {
     let mut made = Made::new("panels");
@@ -79,7 +91,7 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
         let (mut sum, mut all, mut squared, mut shut, mut hemisphere) =
             ([0.0; 3], [0.0; 3], [DVec3::ZERO; 2], 0.0, 0.0);
         let (x, y) = (i % size[0] as usize, i / size[0] as usize);
-        for at in &lists[y % 4 * 4 + x % 4] {
+        for at in &lists[list_of(x, y)] {
             let cos = n.dot(at.direction).max(0.0);
             let free = cos > 0.0 && world.closest(&Ray::new(origin, at.direction)).is_none();
             let projected = cos * at.solid_angle;
@@ -112,6 +124,29 @@ fn the_share_that_arrives_is_that_of_ray_casts() {
     eprintln!("{compared} pixels, {off} off, {darker} darker by a tenth");
     assert!(compared > 3000 && darker > 1000, "{compared} pixels, {darker} darker");
     assert!(off * 200 <= compared, "{off} of {compared} pixels are off");
+}
+
+/// In half shadow neighbours differ, but not in a pattern that repeats: a mesh is seen more than grain.
+#[test]
+fn half_shadows_have_no_mesh() {
+    let (gpu, map) = (Gpu::open(), Environment::studio());
+    let mut made = Made::new("wall");
+    made.add(Shape::panel(8.0, 8.0), matt([0.8; 3]), turned(DVec3::X, -90.0, DVec3::ZERO));
+    made.add(Shape::panel(8.0, 8.0), matt([0.0; 3]), DAffine3::from_translation(DVec3::Z * -1.0));
+    made.camera(DVec3::Y * 3.0, DVec3::ZERO, orthographic(0.2));
+    let size = [64, 64];
+    let film = film(&gpu, &made.0, &map, size, &["samples=1", "indirect=occlusion:16"]);
+    let at = |x: usize, y: usize| f64::from(film.rgba[y * 64 + x][1]);
+    // What a pixel is off the mean of its square, against the pixel at the same place of the next square.
+    let off =
+        |x: usize, y: usize| at(x, y) - (0..16).map(|i| at(x / 4 * 4 + i % 4, y / 4 * 4 + i / 4)).sum::<f64>() / 16.0;
+    let (mut product, mut square) = (0.0, 0.0);
+    for (x, y) in (0..64).flat_map(|y| (0..60).map(move |x| (x, y))) {
+        product += off(x, y) * off(x + 4, y);
+        square += off(x, y).powi(2);
+    }
+    eprintln!("correlation of squares {:.3}", product / square);
+    assert!(square > 0.0 && (product / square).abs() < 0.3, "{product} of {square}");
 }
 
 #[test]

@@ -184,6 +184,59 @@ fn rungs_of_light_sampling_agree() {
         noise.push(one.rgba.iter().zip(&best.rgba).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum::<f64>());
     }
     assert!(noise[0] > 2.0 * noise[1] && noise[1] > 2.0 * noise[2], "{noise:?}");
+    // One of several candidates has less noise than one alone: the panels' backs and grazing ones are not chosen.
+    let best = shot(&gpu, &made.0, Model::Recursive, &["samples=256", "lights=area:16"]);
+    let noise = ["hierarchy", "resampled:2", "resampled:4"].map(|rung| {
+        let sampler = &format!("light-sampler={rung}");
+        let [found, ..] = mean(&["samples=64", sampler]);
+        assert!((found / wanted - 1.0).abs() < 0.01, "{sampler}: {found}, not {wanted}");
+        let few = shot(&gpu, &made.0, Model::Recursive, &["samples=4", "lights=area:1", sampler]);
+        few.rgba.iter().zip(&best.rgba).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum::<f64>()
+    });
+    eprintln!("noise by one sample, and of two and four candidates: {noise:?}");
+    assert!(noise[1] < 0.8 * noise[0] && noise[2] < 0.8 * noise[1], "{noise:?}");
+}
+
+/// Candidates are weighed by the light above the triangle, yet what comes from below has its mean.
+#[test]
+fn candidates_find_light_from_behind() {
+    let gpu = Gpu::open();
+    let mut made = Made::new("leaf between panels");
+    let mut leaf = Material { double_sided: true, ..lambert([0.5; 3]) };
+    leaf.lobes[DIFFUSE_TRANSMISSION].factors = [0.8, 0.9, 0.5, 0.7];
+    made.add(Shape::panel(2.0, 2.0), leaf, lying());
+    for i in 0..4 {
+        let height = if i % 2 == 0 { -0.6 } else { 0.7 };
+        made.add(Shape::panel(0.4, 0.4), glowing(), at(f64::from(i) - 1.5, height, 0.2) * lying());
+    }
+    made.camera(DVec3::Y * 2.0, DVec3::ZERO, orthographic(0.1));
+    let renderer = gpu.renderer(&made.0, None, settings_of(Model::Recursive, [16, 16], &[]));
+    assert_eq!(renderer.plan().light_samples.candidates, 4);
+    drop(renderer);
+    agree(&gpu, &made.0, "leaf between panels", &[], 0.01);
+}
+
+/// The pixels of a square share one stratified sequence, so that their errors cancel: the mean of 4x4 pixels is nearer
+/// to its limit than that of 16 independent ones.
+#[test]
+fn errors_of_neighbours_cancel() {
+    let gpu = Gpu::open();
+    let mut made = floor(lambert([0.6; 3]));
+    made.0.cameras.clear();
+    made.camera(DVec3::new(0.0, 2.0, 0.5), DVec3::new(0.0, 0.0, 0.2), orthographic(0.2));
+    let film = |choices: &[&str]| {
+        let choices = &[&["interfaces=1", DIRECT], choices].concat();
+        gpu.shot(&made.0, None, settings_of(Model::Recursive, [64, 64], choices)).1
+    };
+    let (few, truth) = (film(&["samples=4", "lights=area:1"]), film(&["samples=64", "lights=area:16"]));
+    let off: Vec<f64> = few.rgba.iter().zip(&truth.rgba).map(|(a, b)| f64::from(a[1] - b[1])).collect();
+    let of_pixels = off.iter().map(|off| off * off).sum::<f64>() / off.len() as f64;
+    let squares = (0..16).flat_map(|y| (0..16).map(move |x| (x, y)));
+    let means = squares.map(|(x, y)| (0..16).map(|i| off[(4 * y + i / 4) * 64 + 4 * x + i % 4]).sum::<f64>() / 16.0);
+    let of_squares = means.map(|off| off * off).sum::<f64>() / 256.0;
+    let share = 16.0 * of_squares / of_pixels;
+    eprintln!("the squares have {share:.3} of the variance of independent pixels");
+    assert!(of_pixels > 0.0 && share < 0.5, "{share}");
 }
 
 /// Without a light of an extent nothing is sampled: the same picture to the bit, with the same plan.

@@ -543,7 +543,11 @@ fn the_plan_says_which_grid_is_marched_and_what_is_not_said_in_vain() {
     assert_eq!((effect(&plan, "quadrature").state.name(), effect(&plan, "quadrature").rung()), ("used", "simpson"));
     assert!(plan.warnings.is_empty(), "{:?}", plan.warnings);
 
-    let plan = planned(&made.0, &["quadrature=simpson"]);
+    let plan = planned(&made.0, &[]);
+    assert_eq!((plan.march().steps, plan.march().rule), (8, Quadrature::Midpoint));
+    assert!(plan.warnings.is_empty(), "{:?}", plan.warnings);
+
+    let plan = planned(&made.0, &["absorption=path", "quadrature=simpson"]);
     assert_eq!(plan.march().steps, 0);
     assert_eq!(effect(&plan, "heterogeneous media").reason(), "absorption=path");
     assert!(warned(&plan, &["\"fog\"", "absorption=path", "mean", "march:4"]), "{:?}", plan.warnings);

@@ -33,6 +33,7 @@ layout(scene, scalar) readonly buffer SkyDirections { SkyDirection sky_direction
 // Events of the random numbers, after those of reflection and refraction. All pixels have the same numbers.
 const uint BASE_LOBE_EVENT = 0x400u;
 const uint COAT_LOBE_EVENT = 0x401u;
+const uint LIST_EVENT = 0x402u;
 
 // What the directions so far have shown: sums that are shares at the end.
 struct SkyShown {
@@ -58,9 +59,12 @@ struct SkyRay {
 // more than 24 GB (lib/arithmetic.glsl).
 uint sky_list = 0;
 
+// Each square has them in an order of its own: with one order for all a mesh would show in half shadows.
 uint list_of(uvec2 pixel) {
+    uvec2 square = pixel / PATTERN_SIDE;
     uvec2 place = pixel % PATTERN_SIDE;
-    return place.y * PATTERN_SIDE + place.x;
+    uint order = hash(uvec3(square, LIST_EVENT));
+    return (place.y * PATTERN_SIDE + place.x) ^ (order & (PATTERN_SIDE * PATTERN_SIDE - 1u));
 }
 
 // Direction `i` of a surface. Those between the triangle's plane and that of the interpolated normal count nowhere: a smooth
@@ -173,7 +177,7 @@ LobeShown lobe_shown(Surface s, vec3 n, float alpha, uint event) {
         uint index = trace_terms.sample_index * LOBE_RAYS + i;
         // Else the frames that sampling needs would be kept while rays are traced: 16 registers on AMD.
         vec3 around = found_anew(n, i);
-        vec3 h = half_vector(around, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index));
+        vec3 h = half_vector(around, s.v, alpha, random_point(uvec2(0), event, trace_terms.seed, index, 1));
         vec3 r = reflect_ray(-s.v, h).R;
         float weight = unshadowed(n, s.v, r, s.n_triangle, alpha);
         vec3 visible = visibility(s.p_bvh, s.n_triangle, s.v, s.face, s.media, r, LARGEST, true, weight > 0.0 && !s.unlit);

@@ -36,11 +36,49 @@ layout(constant) const bool SCREEN_MIRRORS = false;
 const uint LIGHT_EVENT = 0x800u;
 const uint FIRST_FRAGMENT = 0x1000u;
 
+// Light samples from which one is chosen; 1: it is the only one.
+layout(constant) const uint LIGHT_CANDIDATES = 1;
+// Event of the choice, beside that of the samples.
+const uint CHOICE_EVENT = 0x40000000u;
+// Part of the target that does not depend on the direction.
+const float FROM_ANYWHERE = 0.1;
+
 // A light sample by next event estimation: one of LIGHT_SAMPLES for each sample of a pixel. `to_light` begins at `origin`,
-// where the shadow ray does.
-LightSample light_sample(vec3 origin, uvec2 pixel, uint surface, uint i) {
-    uvec2 words = random_words(pixel, LIGHT_EVENT + surface, trace_terms.seed, trace_terms.sample_index * LIGHT_SAMPLES + i);
-    return sample_emitter(origin, choose_emitter(origin, words.x), words.y);
+// where the shadow ray does; n is the unit normal of the triangle.
+// With several candidates it is one of them (resampled importance sampling, Talbot et al. 2005). Each is drawn by its density
+// p and has the weight w = p̂/p. One is chosen in proportion to w, and counts as if it were drawn by p̂/mean(w). The target p̂
+// is about the irradiance without shadow. It is nowhere 0 where light arrives: what a surface makes of light from below its
+// triangle has the right mean, too. Every step is precise: a rounding would choose another one.
+LightSample light_sample(vec3 origin, vec3 n, uvec2 pixel, uint surface, uint i) {
+    uint event = LIGHT_EVENT + surface;
+    uint index = trace_terms.sample_index * LIGHT_SAMPLES + i;
+    uint count = trace_terms.samples * LIGHT_SAMPLES;
+    precise float u = 0.0;
+    if (LIGHT_CANDIDATES > 1) u = unit_float(random_words(pixel, event | CHOICE_EVENT, trace_terms.seed, index, count).x);
+    LightSample chosen = NO_LIGHT_SAMPLE;
+    precise float weight = 0.0;
+    precise float sum = 0.0;
+    for (uint j = 0; j < LIGHT_CANDIDATES; j++) {
+        uvec2 words = random_words(pixel, event, trace_terms.seed, index * LIGHT_CANDIDATES + j, count * LIGHT_CANDIDATES);
+        LightSample drawn = sample_emitter(origin, choose_emitter(origin, words.x), words.y);
+        if (LIGHT_CANDIDATES == 1) return drawn;
+        precise float cosine = max(dot(n, normalize(drawn.to_light)), 0.0);
+        precise float target = cosine + FROM_ANYWHERE;
+        precise float of_drawn = largest(drawn.arriving) * target;
+        sum += of_drawn;
+        // Weighted reservoir sampling (Chao 1982). What is left of the random number is uniform again.
+        precise float share = sum > 0.0 ? of_drawn / sum : 1.0;
+        bool is_chosen = u < share;
+        precise float left = is_chosen ? u / share : (u - share) / (1.0 - share);
+        u = left;
+        if (is_chosen) {
+            chosen = drawn;
+            weight = of_drawn;
+        }
+    }
+    precise float correction = weight > 0.0 ? sum / (weight * float(LIGHT_CANDIDATES)) : 0.0;
+    chosen.arriving *= correction;
+    return chosen;
 }
 
 layout(constant) const bool SAMPLED_APART = false; // another kernel has drawn the first light sample of the surface
@@ -81,7 +119,7 @@ vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, ui
             if (SAMPLED_APART && (LIGHT_SAMPLES == 1 || index == 0)) {
                 drawn = drawn_apart();
             } else {
-                drawn = light_sample(ray_origin(s.p_bvh, s.n_triangle, s.v), pixel, surface, index);
+                drawn = light_sample(ray_origin(s.p_bvh, s.n_triangle, s.v), s.n_triangle, pixel, surface, index);
             }
             // Samples without light are evaluated as well: with a selection here the plans of a scene and of everything
             // differed by roundings, in 153 pixels of study:etalon.

@@ -40,13 +40,14 @@ const uint DIMENSION_PIXEL = 3;  // of the camera ray alone, before the first ve
 const uint DIMENSION_PHOTON = 3; // of a vertex's successor: its number is one more
 
 uvec2 dimension_words(uvec2 pixel, uint surface, uint draw) {
-    return random_words(pixel, surface * DIMENSION_PAIRS + draw, trace_terms.seed, trace_terms.sample_index);
+    return random_words(pixel, surface * DIMENSION_PAIRS + draw, trace_terms.seed, trace_terms.sample_index, trace_terms.samples);
 }
 
 // The point numbered `i` of `count` in one dimension pair: neighbours in the sequence, which fill the square evenly
 // together (stratification).
 uvec2 dimension_words_of(uvec2 pixel, uint surface, uint draw, uint i, uint count) {
-    return random_words(pixel, surface * DIMENSION_PAIRS + draw, trace_terms.seed, trace_terms.sample_index * count + i);
+    uint index = trace_terms.sample_index * count + i;
+    return random_words(pixel, surface * DIMENSION_PAIRS + draw, trace_terms.seed, index, trace_terms.samples * count);
 }
 
 // The film's value for a terminated path. If it escaped to the background, `distance_since_vertex` is the background's

@@ -1,6 +1,6 @@
 // Random numbers: a low-discrepancy Sobol sequence with Owen scrambling, keyed by pixel, sample and event.
-// They do not depend on the order of the work, so the picture does not either. Where to read: pbrt 4, section 8.7; Burley,
-// JCGT 9(4) 2020 (hash-based Owen scrambling); Laine and Karras 2011.
+// They do not depend on the order of the work, so the picture does not either. Where to read: pbrt 4, section 8.7; Ahmed and
+// Wonka 2020 (the sequence along a Morton curve over the pixels); Burley, JCGT 9(4) 2020 (hash-based Owen scrambling).
 #ifndef RANDOM_GLSL
 #define RANDOM_GLSL
 
@@ -43,19 +43,34 @@ uint sobol_second_backwards(uint index) {
     return index;
 }
 
-// A point in the unit square, as words, for one event of one sample of a pixel. It is the (0, 2)-sequence of Sobol: any 2^k
-// samples from a multiple of 2^k on are stratified, with their share in each elementary interval. Each pixel, event and
-// seed shuffles and scrambles the sequence in its own way (Burley, JCGT 9(4) 2020).
-uvec2 random_words(uvec2 pixel, uint event, uint seed, uint index) {
-    uint key = hash(uvec3(pixel.x | pixel.y << 16, event, seed ^ 0x68bc21ebu));
-    uint place = bitfieldReverse(scrambled_backwards(bitfieldReverse(index), key));
-    uint x = scrambled_backwards(place, pcg(key));
-    uint y = scrambled_backwards(sobol_second_backwards(place), pcg(key ^ 0x9e3779b9u));
+// Pixels in blocks of 16x16.
+const uint BLOCK = 16;
+
+// Number of a pixel of a block along a Morton curve: the bits of x and y, 4 each, in turns.
+uint morton(uvec2 place) {
+    uint bits = place.x | place.y << 16;
+    bits = (bits | bits << 2) & 0x00330033u;
+    bits = (bits | bits << 1) & 0x00550055u;
+    return (bits | bits >> 15) & 0xffu;
+}
+
+// A point in the unit square, as words, for one event of one sample of a pixel: number `index` of the pixel's `count`, a power
+// of two. It is the (0, 2)-sequence of Sobol: any 2^k points from a multiple of 2^k on are stratified, with their share in each
+// elementary interval. The pixels of a block follow each other in the sequence in Morton order, so the points of each square of
+// 2x2, 4x4 or 8x8 pixels are stratified together as well: errors of neighbours cancel, and what is left is fine grain (blue
+// noise). Each block, event and seed shuffles and scrambles the sequence in its own way.
+uvec2 random_words(uvec2 pixel, uint event, uint seed, uint index, uint count) {
+    uvec2 block = pixel / BLOCK;
+    uint key = hash(uvec3(block.x | block.y << 16, event, seed ^ 0x68bc21ebu));
+    uint in_order = morton(pixel % BLOCK) * count + index;
+    uint shuffled = bitfieldReverse(scrambled_backwards(bitfieldReverse(in_order), key));
+    uint x = scrambled_backwards(shuffled, pcg(key));
+    uint y = scrambled_backwards(sobol_second_backwards(shuffled), pcg(key ^ 0x9e3779b9u));
     return uvec2(bitfieldReverse(x), bitfieldReverse(y));
 }
 
-vec2 random_point(uvec2 pixel, uint event, uint seed, uint index) {
-    uvec2 words = random_words(pixel, event, seed, index);
+vec2 random_point(uvec2 pixel, uint event, uint seed, uint index, uint count) {
+    uvec2 words = random_words(pixel, event, seed, index, count);
     return vec2(unit_float(words.x), unit_float(words.y));
 }
 #endif

@@ -183,7 +183,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     next.media = ray.media;
     if (CLEARCOAT) {
         vec2 u = vec2(0.0);
-        if (ROUGH) u = random_point(pixel, event | COAT_EVENT, trace_terms.seed, trace_terms.sample_index);
+        if (ROUGH) u = random_point(pixel, event | COAT_EVENT, trace_terms.seed, trace_terms.sample_index, trace_terms.samples);
         LobeSample coat = sample_coat(b, event_half_vector(b, true, u));
         next.direction = coat.direction;
         next.events = count | BY_REFLECTION << 8;
@@ -194,7 +194,7 @@ void split(HitSurface hit, Boundary boundary, Branch ray, float cone, uvec2 pixe
     }
     // 3. Reflection by the base.
     vec2 u = vec2(0.0);
-    if (ROUGH) u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index);
+    if (ROUGH) u = random_point(pixel, event, trace_terms.seed, trace_terms.sample_index, trace_terms.samples);
     vec3 h = event_half_vector(b, false, u);
     FacetFresnel fresnel = fresnel_at_facet(b, h);
     LobeSample mirrored = sample_base(b, h, fresnel);

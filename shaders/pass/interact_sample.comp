@@ -16,6 +16,6 @@ void main() {
     waiting = known.y;
     Branch ray = last_branch();
     HitPoint point = hit_point_of(tree_hit(), ray.origin, ray.direction);
-    vec3 origin = ray_origin(point.p, facing_normal(point, ray.direction), -ray.direction);
-    write_light(light_sample(origin, uvec2(unpacked_pixel(known.x)), known.z, 0));
+    vec3 n = facing_normal(point, ray.direction);
+    write_light(light_sample(ray_origin(point.p, n, -ray.direction), n, uvec2(unpacked_pixel(known.x)), known.z, 0));
 }

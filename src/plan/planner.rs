@@ -424,7 +424,8 @@ impl Planner<'_> {
             cause,
         );
         let count = if *paths || emitting || shaped { knobs.lights.samples() } else { 0 };
-        LightSamples { emitting, shaped, hierarchy, count }
+        let candidates = if hierarchy && !*paths { knobs.light_sampler.candidates() } else { 0 };
+        LightSamples { emitting, shaped, hierarchy, candidates, count }
     }
 
     fn path_guiding(&mut self, followed: bool, samples: LightSamples) -> bool {

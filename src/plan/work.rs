@@ -153,6 +153,9 @@ pub struct LightSamples {
     pub shaped: bool,
     /// Lights are sampled by a light hierarchy.
     pub hierarchy: bool,
+    /// Light samples from the hierarchy of which one is chosen (resampled importance sampling); 0 without the
+    /// hierarchy, and in path tracing, whose weights need the density of a sample.
+    pub candidates: u32,
     /// Light samples of each surface, for each sample of a pixel; 0 where nothing is sampled.
     pub count: u32,
 }

@@ -327,13 +327,15 @@ impl RaysOnDevice {
         self.fixed.camera_media = media_around(&self.bodies, &self.solids, view.eye);
     }
 
-    /// Updates the constants of rays for one sample of a view, whose eye is set.
-    pub fn set_view(&mut self, view: &View, sample_index: u32, samples: u32, seed: u32) {
+    /// Updates the constants of rays for one sample of a view, whose eye is set: number `sample_index` of the
+    /// `of_sum` that are summed together, of all `samples` of a pixel.
+    pub fn set_view(&mut self, view: &View, [sample_index, of_sum]: [u32; 2], samples: u32, seed: u32) {
         let eye = view.eye - self.anchor;
         let terms = TraceTerms {
             bvh_from_rel: eye.as_vec3().to_array(),
             seed,
             sample_index,
+            samples: of_sum.next_power_of_two(),
             pixel_angle: view.pixel_angle() as f32,
             lod_bias: -0.5 * (samples as f32).log2(),
             snap: view.snap(self.snap_pixels).map(|off| off as f32),

@@ -156,6 +156,7 @@ impl<'a> OnDevice<'a> {
                 local_lights: if plan.tiles { 0 } else { plan.local_lights },
                 tile_words,
                 light_budget: u32::MAX,
+                light_candidates: plan.light_samples.candidates.max(1),
                 screen_mirrors: false,
                 sampled_apart: false,
                 lit_at_hits: false,

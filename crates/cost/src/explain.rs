@@ -184,7 +184,7 @@ fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
         EffectId::PathTracing => paths.into(),
         EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
         EffectId::EmissiveLights | EffectId::AreaLights | EffectId::LightHierarchy => {
-            vec![Lights::Area4.choice(), LightSampler::Hierarchy.choice()]
+            vec![Lights::Area4.choice(), LightSampler::Resampled4.choice()]
         }
         EffectId::PathGuiding => [&paths[..], &[Lights::Area1.choice(), Guiding::Photons.choice()]].concat(),
         EffectId::Caustics => [&paths[..], &[Caustics::Photons16384.choice()]].concat(),

@@ -55,7 +55,7 @@ effects! {
     AreaLights = "analytic area lights":
         "a sphere, disk or rectangle light, with `lights=area:N`" => "the BVH; code",
     LightHierarchy = "light hierarchy":
-        "3 emissive triangles or area lights, in path tracing also point and spot lights, with `light-sampler=hierarchy`" => "a table of nodes; code",
+        "3 emissive triangles or area lights, in path tracing also point and spot lights, unless `light-sampler=power`" => "a table of nodes; code",
     PathGuiding = "path guiding":
         "a smooth surface that light reaches and that sends it to a diffuse one, with `guiding=photons` and path tracing" => "photons, a grid of cells with bounding spheres; code",
     Caustics = "caustics of punctual lights":
@@ -345,7 +345,7 @@ knob! {
         #[doc = march_about!(64)]
         March64 = "march:64",
     }
-    presets: [Thickness, Path, March32],
+    presets: [Thickness, March8, March32],
     exact: March64,
     lecture: ["A1", "A2"],
     effects: [Absorption, HeterogeneousMedia],
@@ -452,18 +452,40 @@ impl Lights {
     }
 }
 
+macro_rules! resampled_about {
+    ($candidates:literal) => {
+        concat!(
+            "As hierarchy, but one of ",
+            $candidates,
+            " light samples is chosen by the light that it sends to the surface. Paths draw a single one."
+        )
+    };
+}
+
 knob! {
     LightSampler = "light-sampler" {
         /// Lights are chosen by their power, whatever the surface: noisy where many lights are far apart.
         Power = "power",
         /// Lights are chosen by their importance at each surface, from a light hierarchy: less noise with many lights.
         Hierarchy = "hierarchy",
+        #[doc = resampled_about!("two")]
+        Resampled2 = "resampled:2",
+        #[doc = resampled_about!("four")]
+        Resampled4 = "resampled:4",
     }
-    presets: [Power, Hierarchy, Hierarchy],
+    presets: [Power, Resampled4, Hierarchy],
     exact: Hierarchy,
     lecture: ["R4", "R6"],
     effects: [LightHierarchy],
-    about: "choice of a light to sample at a surface: by power alone, or by a light hierarchy with distance and orientation; the same mean",
+    about: "choice of a light to sample at a surface: by power, by a light hierarchy with distance and orientation, or one of N samples from it (resampled importance sampling); the same mean",
+}
+
+impl LightSampler {
+    /// Samples from which one is chosen.
+    #[must_use]
+    pub fn candidates(self) -> u32 {
+        number(self.name(), "resampled:").unwrap_or(1)
+    }
 }
 
 knob! {
