@@ -59,13 +59,13 @@ fn figures(gpu: &Gpu) -> Figures {
 /// Registers of a SIMD unit on which a kernel may have 128.
 const REGISTER_FILE: u64 = 1024;
 
-/// No kernel keeps registers or arrays in memory, none has much more code than the 32 KB that a cache of instructions
-/// holds, and none has more than 128 registers. A SIMD unit with more than 1,024 (RDNA 3) hands them out in larger
-/// steps: what its subgroups have in all shows it.
+/// No kernel keeps registers or arrays in memory, none has more than 40 KB of code, where a cache of instructions holds
+/// 32 (marching through the grid of study:haze takes a fifth of that), and none has more than 128 registers. A SIMD
+/// unit with more than 1,024 (RDNA 3) hands them out in larger steps: what its subgroups have in all shows it.
 fn check_size(device: &str, figures: &Figures) {
     let too_large = |of: &Footprint| {
         let crowds = of.registers > 128 && of.registers * of.subgroups <= REGISTER_FILE;
-        crowds || of.spilled > 0 || of.scratch_bytes > 0 || of.code_bytes > 34 << 10
+        crowds || of.spilled > 0 || of.scratch_bytes > 0 || of.code_bytes > 40 << 10
     };
     let large: Vec<_> = figures.iter().filter(|(_, of)| too_large(of)).collect();
     assert!(large.is_empty(), "{device}: of many registers, spilled, in memory or of much code: {large:#?}");

@@ -197,7 +197,36 @@ fn rungs_of_light_sampling_agree() {
     assert!(noise[1] < 0.8 * noise[0] && noise[2] < 0.8 * noise[1], "{noise:?}");
 }
 
-/// Candidates are weighed by the light above the triangle, yet what comes from below has its mean.
+/// A glossy floor below a row of lamps: each point mirrors one of them, which candidates find by the lobe.
+#[test]
+fn candidates_are_weighed_by_the_lobe() {
+    let gpu = Gpu::open();
+    let mut made = Made::new("row of lamps");
+    let metal = Material { metallic: 1.0, roughness: 0.3, ..lambert([0.9; 3]) };
+    made.add(Shape::panel(8.0, 8.0), metal, lying());
+    for i in 0..16 {
+        made.add(Shape::panel(0.1, 0.1), glowing(), at(0.3 * f64::from(i) - 2.25, 0.4, -1.0));
+    }
+    // Only the floor is in the picture: edges of lamps would have an error of their own.
+    made.camera(DVec3::new(0.0, 2.0, 3.2), DVec3::new(0.0, 0.0, -0.3), orthographic(0.25));
+    let film = |choices: &[&str]| {
+        let choices = &[&["interfaces=1", DIRECT, "brdf=ggx"], choices].concat();
+        gpu.shot(&made.0, None, settings_of(Model::Recursive, [32, 32], choices)).1
+    };
+    let best = film(&["samples=256", "lights=area:16", "light-sampler=hierarchy"]);
+    let [wanted, ..] = spread(&best, 0);
+    let noise = ["light-sampler=hierarchy", "light-sampler=resampled:4"].map(|sampler| {
+        let [found, error, _] = spread(&film(&["samples=64", sampler]), 0);
+        let few = film(&["samples=4", "lights=area:1", sampler]);
+        eprintln!("{sampler}: {found} ± {error} for {wanted}");
+        assert!((found / wanted - 1.0).abs() < 0.01, "{sampler}: {found}, not {wanted}");
+        few.rgba.iter().zip(&best.rgba).map(|(a, b)| f64::from(a[0] - b[0]).powi(2)).sum::<f64>()
+    });
+    eprintln!("noise of one sample, and of four candidates: {noise:?}, {}", noise[1] / noise[0]);
+    assert!(noise[1] < 0.2 * noise[0], "{noise:?}");
+}
+
+/// Candidates are weighed by the light on one side, yet what comes from the other has its mean.
 #[test]
 fn candidates_find_light_from_behind() {
     let gpu = Gpu::open();

@@ -43,13 +43,51 @@ const uint CHOICE_EVENT = 0x40000000u;
 // Part of the target that does not depend on the direction.
 const float FROM_ANYWHERE = 0.1;
 
+// What decides how much light a surface makes of a light sample: its diffuse layer, and one round lobe.
+struct Receiver {
+    vec3 n;         // unit normal
+    vec3 v;         // unit vector to the viewer
+    float diffuse;  // albedos
+    float specular;
+    float alpha;
+};
+
+// A lobe that a ray samples counts as none: light samples leave it out. The albedo of another one is taken for its reflectance at
+// the viewer's angle, because some plans have no table of albedos.
+Receiver receiver_of(Surface s) {
+    float specular = largest(schlick(f0_of(s), f90_of(s), clamp(dot(s.n, s.v), 0.0, 1.0)));
+    return Receiver(s.n, s.v, largest(s.diffuse), s.base_traced ? 0.0 : specular, max(s.alpha, 1e-3));
+}
+
+// Of a surface that a ray has met only its triangle counts: on GPUs the kernel that draws its sample has no more.
+Receiver receiver_at_hit(vec3 n_triangle) {
+    return Receiver(n_triangle, n_triangle, 1.0, 0.0, 1.0);
+}
+
+// About the radiance that the receiver makes of irradiance from the unit direction l, times π. It is nowhere 0: light from below, and
+// what coats and other lobes make of it, has the right mean, too.
+float target_at(Receiver r, vec3 l) {
+    precise float diffuse = r.diffuse * max(dot(r.n, l), 0.0);
+    precise float anywhere = FROM_ANYWHERE * (r.diffuse + r.specular) + 1e-3;
+    precise float target = diffuse + anywhere;
+    // The density of the directions of a GGX lobe, D cos θ_h / (4 v·h).
+    precise vec3 sum = r.v + l;
+    precise float length2 = max(dot(sum, sum), 1e-12);
+    precise float to_middle = dot(r.n, sum);
+    precise float cos2_h = to_middle * to_middle / length2;
+    precise float spread = 1.0 - cos2_h * (1.0 - r.alpha * r.alpha);
+    precise float density = r.alpha * r.alpha * to_middle / (2.0 * length2 * spread * spread);
+    precise float lobe = r.specular * density;
+    precise float whole = target + lobe;
+    return dot(r.n, l) > 0.0 && to_middle > 0.0 ? whole : target;
+}
+
 // A light sample by next event estimation: one of LIGHT_SAMPLES for each sample of a pixel. `to_light` begins at `origin`,
-// where the shadow ray does; n is the unit normal of the triangle.
+// where the shadow ray does.
 // With several candidates it is one of them (resampled importance sampling, Talbot et al. 2005). Each is drawn by its density
 // p and has the weight w = p̂/p. One is chosen in proportion to w, and counts as if it were drawn by p̂/mean(w). The target p̂
-// is about the irradiance without shadow. It is nowhere 0 where light arrives: what a surface makes of light from below its
-// triangle has the right mean, too. Every step is precise: a rounding would choose another one.
-LightSample light_sample(vec3 origin, vec3 n, uvec2 pixel, uint surface, uint i) {
+// is about the light that the surface sends to the viewer without shadow.
+LightSample light_sample(vec3 origin, Receiver receiver, uvec2 pixel, uint surface, uint i) {
     uint event = LIGHT_EVENT + surface;
     uint index = trace_terms.sample_index * LIGHT_SAMPLES + i;
     uint count = trace_terms.samples * LIGHT_SAMPLES;
@@ -62,13 +100,12 @@ LightSample light_sample(vec3 origin, vec3 n, uvec2 pixel, uint surface, uint i)
         uvec2 words = random_words(pixel, event, trace_terms.seed, index * LIGHT_CANDIDATES + j, count * LIGHT_CANDIDATES);
         LightSample drawn = sample_emitter(origin, choose_emitter(origin, words.x), words.y);
         if (LIGHT_CANDIDATES == 1) return drawn;
-        precise float cosine = max(dot(n, normalize(drawn.to_light)), 0.0);
-        precise float target = cosine + FROM_ANYWHERE;
-        precise float of_drawn = largest(drawn.arriving) * target;
+        precise float of_drawn = largest(drawn.arriving) * target_at(receiver, normalize(drawn.to_light));
         sum += of_drawn;
-        // Weighted reservoir sampling (Chao 1982). What is left of the random number is uniform again.
+        // Weighted reservoir sampling (Chao 1982). What is left of the random number is uniform again. The first is chosen
+        // whatever its share: on some devices the quotient of equal numbers is not 1.
         precise float share = sum > 0.0 ? of_drawn / sum : 1.0;
-        bool is_chosen = u < share;
+        bool is_chosen = j == 0 || u < share;
         precise float left = is_chosen ? u / share : (u - share) / (1.0 - share);
         u = left;
         if (is_chosen) {
@@ -119,7 +156,9 @@ vec3 light_on(Layers b, uint index, bool is_sample, bool is_sky, uvec2 pixel, ui
             if (SAMPLED_APART && (LIGHT_SAMPLES == 1 || index == 0)) {
                 drawn = drawn_apart();
             } else {
-                drawn = light_sample(ray_origin(s.p_bvh, s.n_triangle, s.v), s.n_triangle, pixel, surface, index);
+                Receiver receiver = receiver_at_hit(s.n_triangle);
+                if (!LIT_AT_HITS) receiver = receiver_of(s);
+                drawn = light_sample(ray_origin(s.p_bvh, s.n_triangle, s.v), receiver, pixel, surface, index);
             }
             // Samples without light are evaluated as well: with a selection here the plans of a scene and of everything
             // differed by roundings, in 153 pixels of study:etalon.

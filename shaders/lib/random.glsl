@@ -1,4 +1,4 @@
-// Random numbers: a low-discrepancy Sobol sequence with Owen scrambling, keyed by pixel, sample and event.
+// Random numbers: a low-discrepancy Sobol sequence with Owen scrambling, keyed by block of pixels, event and seed.
 // They do not depend on the order of the work, so the picture does not either. Where to read: pbrt 4, section 8.7; Ahmed and
 // Wonka 2020 (the sequence along a Morton curve over the pixels); Burley, JCGT 9(4) 2020 (hash-based Owen scrambling).
 #ifndef RANDOM_GLSL

@@ -17,5 +17,5 @@ void main() {
     Branch ray = last_branch();
     HitPoint point = hit_point_of(tree_hit(), ray.origin, ray.direction);
     vec3 n = facing_normal(point, ray.direction);
-    write_light(light_sample(ray_origin(point.p, n, -ray.direction), n, uvec2(unpacked_pixel(known.x)), known.z, 0));
+    write_light(light_sample(ray_origin(point.p, n, -ray.direction), receiver_at_hit(n), uvec2(unpacked_pixel(known.x)), known.z, 0));
 }

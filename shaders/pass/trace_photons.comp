@@ -21,7 +21,7 @@ const float SURVIVES = 0.75;
 
 // The photons of a sample are the elements of one sequence for each surface and draw.
 uvec2 photon_words(uint photon, uint surface, uint draw) {
-    return random_words(uvec2(trace_terms.sample_index, 0xffffu), surface * DIMENSION_PAIRS + draw, trace_terms.seed, photon, 1);
+    return random_words(uvec2(trace_terms.sample_index, 0xffffu) * BLOCK, surface * DIMENSION_PAIRS + draw, trace_terms.seed, photon, 1);
 }
 
 void main() {

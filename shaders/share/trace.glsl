@@ -24,7 +24,7 @@ struct TraceTerms {
     float lod_bias;
     vec2 snap;            // greatest error of a point rebuilt from depth, from vertex rounding: metres, and part of its distance
     uint sample_index;
-    uint samples;         // of a pixel, a power of two (lib/random.glsl)
+    uint samples;         // of a pixel in one sum, rounded up to a power of two (lib/random.glsl)
     uint interfaces;      // greatest number of surfaces that a path may meet
     uint first_emitter;   // texel of the first emitter, behind the triangles of the BVH (lib/emitters.glsl)
     OccluderRadiosity occluder_radiosity;

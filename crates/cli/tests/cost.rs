@@ -101,8 +101,8 @@ fn a_run_is_what_its_commands_draw() {
         let picture = format!("data-name=\"{}\"", point["picture"].as_str().expect("a name"));
         assert!(page.contains(&picture) || name == "reference", "{name}");
     }
-    // The cards describe what each setting loses. `light-sampler` changes only the noise of paths, and no card of a
-    // picture without paths lists it.
+    // The cards describe what each setting loses. `light-sampler` changes only noise, and no card of a picture without
+    // paths lists it.
     let settings = page.split("id=\"trust\"").next().expect("a beginning");
     let mostly = ["that error comes from", "adds the most error", "No setting can be recommended"];
     let says_most = mostly.iter().any(|says| settings.contains(says));

@@ -270,9 +270,11 @@ impl ShownReference {
     }
 
     /// Means over the picture of `of(pixel, channel, [j₁, j₂], v²)`, where j₁ and j₂ are the estimates and v is the
-    /// variance of their noise. Neighbouring pixels have about the same v and independent random numbers. So the
-    /// expected product of their (j₁ − j₂)² is 4v² for any noise distribution; the square within one pixel would depend
-    /// on the distribution.
+    /// variance of their noise. Neighbouring pixels have about the same v. With independent random numbers the expected
+    /// product of their (j₁ − j₂)² is 4v² for any noise distribution; the square within one pixel would depend on the
+    /// distribution. Their numbers are correlated by ρ = −0.1 or so (shaders/lib/random.glsl), which adds 2ρ², some 2
+    /// %, to the product, and Σρ² over the neighbours, 2 to 4 %, to the variance of a mean of products of both halves.
+    /// Neither is counted.
     fn means(&self, of: impl Fn(usize, usize, [f64; 2], f64) -> SquaredSums + Sync) -> [f64; 3] {
         let [j1, j2] = &self.estimates;
         let square = |i: usize, c: usize| (f64::from(j1[i][c]) - f64::from(j2[i][c])).powi(2);

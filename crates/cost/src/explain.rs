@@ -180,7 +180,7 @@ impl Subject<'_> {
 fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
     let paths = [Shadows::Ray.choice(), Reflection::Ray.choice(), Refraction::Ray.choice(), Indirect::Path.choice()];
     match effect {
-        EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Absorption::March32.choice()],
+        EffectId::HeterogeneousMedia => vec![Refraction::Ray.choice(), Absorption::March8.choice()],
         EffectId::PathTracing => paths.into(),
         EffectId::SpectralRendering | EffectId::Dispersion => vec![Colour::Spectral16.choice()],
         EffectId::EmissiveLights | EffectId::AreaLights | EffectId::LightHierarchy => {

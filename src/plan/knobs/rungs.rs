@@ -468,16 +468,16 @@ knob! {
         Power = "power",
         /// Lights are chosen by their importance at each surface, from a light hierarchy: less noise with many lights.
         Hierarchy = "hierarchy",
-        #[doc = resampled_about!("two")]
+        #[doc = resampled_about!(2)]
         Resampled2 = "resampled:2",
-        #[doc = resampled_about!("four")]
+        #[doc = resampled_about!(4)]
         Resampled4 = "resampled:4",
     }
     presets: [Power, Resampled4, Hierarchy],
     exact: Hierarchy,
     lecture: ["R4", "R6"],
     effects: [LightHierarchy],
-    about: "choice of a light to sample at a surface: by power, by a light hierarchy with distance and orientation, or one of N samples from it (resampled importance sampling); the same mean",
+    about: "choice of a light to sample at a surface: by power alone, by a light hierarchy with distance and orientation, or by choosing one of N samples from it (resampled importance sampling); the same mean",
 }
 
 impl LightSampler {
