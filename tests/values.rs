@@ -535,12 +535,12 @@ fn a_slanted_sheet_lets_through_what_it_does_not_reflect() {
             let passes = 1.0 - etalon_testing::lobe::dielectric(m, fresnel == "fresnel=exact", facet.n.z).x;
             etalon_testing::lobe::rgb(behind) * etalon_testing::lobe::base(m) * (f64::from(m.transmission) * passes)
         });
-        // Of 64 even points one too many or too few goes through; the deferred pass has these normals in 2 x 16 bits,
-        // 6.5e-5.
+        // Of the 32 even points of each half one too many or too few goes through, 2 of 64 where 0.4 of them do; the
+        // deferred pass has these normals in 2 x 16 bits, 6.5e-5.
         let bound = match of {
             Model::Local => 2e-4,
             Model::Recursive => 1e-5,
-            Model::Global => 0.05,
+            Model::Global => 0.08,
         };
         assert!(error < bound, "{of:?}, {fresnel}: {error:e}");
     }
