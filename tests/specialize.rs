@@ -173,6 +173,7 @@ fn a_loop_that_never_goes_on_stays_a_loop() {
     gpu.device.try_module(&words).expect("a module");
     for (value, adds) in [(0, true), (1, false)] {
         let left = specialized(&words, &[(0, value)]);
+        assert_eq!(specialized(&left, &[]), left, "a second time there is nothing to do");
         gpu.device.try_module(&left).expect("a module");
         assert_eq!(instructions(&left).iter().any(|one| op(one) == Op::IAdd), adds);
         assert_eq!(instructions(&left).iter().any(|one| op(one) == Op::Undef), !adds);

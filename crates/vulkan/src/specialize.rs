@@ -82,6 +82,8 @@ struct Module<'a> {
     types: Vec<Type>,
     /// The known 32-bit value of each id.
     known: Vec<Option<u32>>,
+    /// Values that are undefined from the start.
+    undefined: HashSet<u32>,
 }
 
 /// The kind of type that an id declares.
@@ -177,7 +179,7 @@ impl Module<'_> {
 pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
     let places = instructions(words, HEADER);
     let ids = words[BOUND] as usize;
-    let mut module = Module { words, types: vec![Type::None; ids], known: vec![None; ids] };
+    let mut module = Module { words, types: vec![Type::None; ids], known: vec![None; ids], undefined: HashSet::new() };
     let mut told = HashMap::new();
     let first_function =
         places.iter().position(|at| op(words, at) == Some(Op::Function)).expect("a module has a function");
@@ -190,6 +192,9 @@ pub fn specialized(words: &[u32], constants: &[(u32, u32)]) -> Vec<u32> {
             }
             Some(Op::TypeBool) => module.types[operands[0] as usize] = Type::Bool,
             Some(Op::TypeInt | Op::TypeFloat) if operands[1] == 32 => module.types[operands[0] as usize] = Type::Number,
+            Some(Op::Undef) => {
+                module.undefined.insert(operands[1]);
+            }
             // Opcodes of type declarations are consecutive.
             Some(ty) if (Op::TypeVoid as u32..=Op::TypeForwardPointer as u32).contains(&(ty as u32)) => {
                 module.types[operands[0] as usize] = Type::Other;
@@ -421,9 +426,15 @@ impl Function {
                     .copied()
                     .collect();
                 if let Some(unreached) = goes_on {
-                    undefined.extend([3 << 16 | Op::Undef as u32, words[phi.start + 1], *bound]);
-                    pairs.extend([*bound, self.blocks[unreached].label]);
-                    *bound += 1;
+                    let from = self.blocks[unreached].label;
+                    let operands = words[phi.start + 3..phi.end].as_chunks::<2>().0;
+                    let is_undefined = |pair: &&[u32; 2]| pair[1] == from && module.undefined.contains(&pair[0]);
+                    let value = operands.iter().find(is_undefined).map(|pair| pair[0]).unwrap_or_else(|| {
+                        undefined.extend([3 << 16 | Op::Undef as u32, words[phi.start + 1], *bound]);
+                        *bound += 1;
+                        *bound - 1
+                    });
+                    pairs.extend([value, from]);
                 }
                 let (ty, result) = (words[phi.start + 1], words[phi.start + 2]);
                 // One reachable predecessor holds for all phis of the block. Drivers make a variable of each phi.
