@@ -23,14 +23,14 @@
 #include "share/sky_direction.glsl"
 
 layout(constant) const uint OCCLUSION_RAYS = 1;    // of a surface, for each sample of a pixel
-layout(constant) const uint SAMPLE_DIRECTIONS = 1; // in the list: those of primary surfaces, then those of others
+layout(constant) const uint SAMPLE_DIRECTIONS = 1; // in all lists: those of primary surfaces, then those of others
 layout(constant) const uint FIRST_DIRECTION = 0;   // of the surface's
 layout(constant) const uint PATTERN_SIDE = 1;      // of the square of pixels with different directions: 1, 2 or 4
 layout(constant) const uint LOBE_RAYS = 1;         // in each specular lobe; 0: lobes are not occluded
 
 layout(scene, scalar) readonly buffer SkyDirections { SkyDirection sky_directions[]; };
 
-// Events of the random numbers, after those of reflection and refraction. All pixels have the same numbers.
+// Events of the random numbers, after those of reflection and refraction. All pixels have the same numbers in their lobes.
 const uint BASE_LOBE_EVENT = 0x400u;
 const uint COAT_LOBE_EVENT = 0x401u;
 const uint LIST_EVENT = 0x402u;
@@ -54,9 +54,8 @@ struct SkyRay {
     float cos_l; // 0 where it is not wanted
 };
 
-// Which of the lists of directions the surface has: the program of primary surfaces sets it. Others have one for all pixels: with
-// their fewer directions a pattern would show in mirrors. No argument of the functions below, for glslang would need
-// more than 24 GB (lib/arithmetic.glsl).
+// Which of the lists of directions the surfaces of the pixel have: each program sets it. No argument of the functions below, for
+// glslang would need more than 24 GB (lib/arithmetic.glsl).
 uint sky_list = 0;
 
 // Each square has them in an order of its own: with one order for all a mesh would show in half shadows.

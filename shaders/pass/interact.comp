@@ -93,6 +93,7 @@ void main() {
     ivec2 pixel = unpacked_pixel(ray_tiles[place]) + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(uvec2(pixel), camera.size))) return;
     // 1. The primary surface, from the G-buffer, and its branches.
+    sky_list = list_of(uvec2(pixel));
     Primary primary = primary_surface(pixel, true);
     if (!primary.drawn) return;
     HitSurface hit = primary.hit;

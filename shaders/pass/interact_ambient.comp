@@ -12,7 +12,9 @@ void main() {
     uint place = place_in_queue();
     if (place < steps[this_step].met.count) {
         tree = queues[MET * trees_at_once + place];
-        waiting = trees[tree_word(TREE_PIXEL)].y;
+        uvec4 known = trees[tree_word(TREE_PIXEL)];
+        waiting = known.y;
+        sky_list = list_of(uvec2(unpacked_pixel(known.x)));
         Branch ray = last_branch();
         Hit found = tree_hit();
         HitSurface hit = surface_met(ray, found, ray.width + ray.spread * found.t, EVERY_SLOT);

@@ -42,7 +42,7 @@ pub fn interact<'a>(
     library.lighting.light_budget = library.loops.loop_budget;
     library.gbuffer.stored_triangles = true;
     library.emitters.light_samples = library.emitters.light_samples.div_ceil(FEWER_AT_HITS);
-    library.ambient_occlusion.first_direction = lighting.plan.occlusion_rays_of_pattern();
+    library.ambient_occlusion.first_direction = lighting.plan.occlusion_directions()[0];
     library.ambient_occlusion.occlusion_rays = lighting.plan.occlusion_rays_at_hits();
     library.lighting.environment_apart = lighting.plan.occlusion_rays() > 0;
     library.ray_tree.first_event = part.map_or(0, |part| part as u32);

@@ -234,10 +234,10 @@ impl Plan {
         }
     }
 
-    /// Directions of ambient occlusion for one sample of all primary surfaces in that square.
+    /// Directions of ambient occlusion for one sample of that square: at all primary surfaces, and at all that rays meet.
     #[must_use]
-    pub fn occlusion_rays_of_pattern(&self) -> u32 {
-        self.occlusion_rays() * self.occlusion_pattern().pow(2)
+    pub fn occlusion_directions(&self) -> [u32; 2] {
+        [self.occlusion_rays(), self.occlusion_rays_at_hits()].map(|rays| rays * self.occlusion_pattern().pow(2))
     }
 
     /// Ray marching through grids of σ.

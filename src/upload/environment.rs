@@ -267,7 +267,7 @@ fn cache_file(device: &Device, chain: &Levels) -> Option<PathBuf> {
 }
 
 /// The directions of ambient occlusion. For each sample: those of primary surfaces, a list for each pixel of the
-/// pattern; then those of surfaces that rays meet, of a coarser cut.
+/// pattern; then those of surfaces that rays meet, of coarser cuts.
 fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed: u32) -> Result<Buffer> {
     if plan.occlusion_rays() == 0 {
         return Buffer::new(device, NOTHING, 0, Place::Device);
@@ -282,12 +282,13 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
     let cut = |rays: u32, pixel: u32| {
         sphere.directions(rays * plan.samples, u64::from(seed) * u64::from(pixels) + u64::from(pixel))
     };
-    let of_pixels: Vec<_> = (0..pixels).into_par_iter().map(|pixel| cut(primary, pixel)).collect();
-    let of_hits = cut(hit, 0);
+    let lists = |rays: u32| (0..pixels).map(move |pixel| (rays, pixel));
+    let lists: Vec<_> = lists(primary).chain(lists(hit)).collect();
+    let cuts: Vec<_> = lists.into_par_iter().map(|(rays, pixel)| (rays, cut(rays, pixel))).collect();
     let mut directions = Vec::new();
     for sample in 0..plan.samples as usize {
-        for (rays, cut) in of_pixels.iter().map(|cut| (primary, cut)).chain([(hit, &of_hits)]) {
-            directions.extend(cut.chunks(rays as usize).nth(sample).into_iter().flatten().map(|at| SkyDirection {
+        for (rays, cut) in &cuts {
+            directions.extend(cut.chunks(*rays as usize).nth(sample).into_iter().flatten().map(|at| SkyDirection {
                 direction: at.direction.as_vec3().to_array(),
                 weight: at.weight.map(|w| w as f32),
                 solid_angle: at.solid_angle as f32,

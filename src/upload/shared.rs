@@ -121,7 +121,7 @@ impl<'a> OnDevice<'a> {
             },
             ambient_occlusion: lib::ambient_occlusion::Constants {
                 occlusion_rays: with.occlusion,
-                sample_directions: plan.occlusion_rays_of_pattern() + plan.occlusion_rays_at_hits(),
+                sample_directions: plan.occlusion_directions().iter().sum(),
                 first_direction: 0,
                 pattern_side: plan.occlusion_pattern(),
                 // Screen-space reflection takes away the whole lobe of the environment, so it has to be whole.
