@@ -54,8 +54,8 @@ struct SkyRay {
     float cos_l; // 0 where it is not wanted
 };
 
-// Which of the lists of directions the surfaces of the pixel have: each program sets it. No argument of the functions below, for
-// glslang would need more than 24 GB (lib/arithmetic.glsl).
+// Which of the lists of directions the surfaces of the pixel have: programs with such rays set it. No argument of the functions
+// below, for glslang would need more than 24 GB (lib/arithmetic.glsl).
 uint sky_list = 0;
 
 // Each square has them in an order of its own: with one order for all a mesh would show in half shadows.

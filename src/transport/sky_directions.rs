@@ -27,7 +27,7 @@ pub struct SkyDirection {
 /// A piece of the sphere.
 #[derive(Clone, Copy)]
 struct Piece {
-    /// In the axes of the cuts.
+    /// In the axes of the cuts: of a cell a unit vector, of a region the mean of its cells' vectors.
     direction: DVec3,
     /// Mean of its shares of all power and of all solid angle.
     measure: f64,
@@ -129,8 +129,8 @@ fn parted(pieces: Vec<Piece>, axis: usize, wanted: f64) -> [Vec<Piece>; 2] {
 /// and Morse): otherwise the directions of a sample would all lie on the same side within regions of a coarser cut.
 fn cut(pieces: Vec<Piece>, count: usize, from_left: bool) -> Vec<Piece> {
     let region = joined(&pieces);
-    if count == 1 {
-        return vec![region];
+    if count <= 1 {
+        return vec![region; count];
     }
     let spread = |piece: &Piece| (piece.direction - region.direction).powf(2.0) * piece.measure;
     let axis = pieces.iter().map(spread).sum::<DVec3>().max_position();
@@ -161,9 +161,13 @@ fn joined<'a>(pieces: impl IntoIterator<Item = &'a Piece>) -> Piece {
 
 /// The `count` regions of a coarser cut of the same sphere, in the order of that cut: powers of two.
 fn coarser(regions: &[Piece], count: usize) -> Vec<Piece> {
-    assert!(regions.len().is_power_of_two() && count.is_power_of_two() && count <= regions.len());
     // The lowest bit of a region's place is its side of the first cut, and so on.
     (0..count).map(|first| joined(regions.iter().skip(first).step_by(count))).collect()
+}
+
+/// The direction of a region's middle. That of the whole sphere is none, but for roundings.
+fn towards(middle: DVec3) -> DVec3 {
+    if middle.length() > 1e-9 { middle.normalize() } else { DVec3::Y }
 }
 
 /// The sphere of an environment, to be cut.
@@ -186,14 +190,12 @@ impl Sphere {
         self.of_regions(self.regions(count, seed), seed)
     }
 
-    /// The same, and `fewer` directions of a coarser cut about the same axes.
-    ///
-    /// # Panics
-    /// When one of the numbers is no power of two, or `fewer` is more than `count`.
+    /// The same, and `fewer` directions of a coarser cut about the same axes: quickly where both are powers of two.
     #[must_use]
     pub fn directions_of_two_cuts(&self, count: u32, fewer: u32, seed: u64) -> [Vec<SkyDirection>; 2] {
         let regions = self.regions(count, seed);
-        let fewer = coarser(&regions, fewer as usize);
+        let is_part = count.is_power_of_two() && fewer.is_power_of_two() && fewer <= count;
+        let fewer = if is_part { coarser(&regions, fewer as usize) } else { self.regions(fewer, seed) };
         [regions, fewer].map(|regions| self.of_regions(regions, seed))
     }
 
@@ -215,8 +217,7 @@ impl Sphere {
         let world_from_cuts = DMat3::from_rotation_y(self.rotation.to_radians()) * Self::map_from_cuts(seed);
         let count = regions.len() as f64;
         let of_region = |region: Piece| SkyDirection {
-            // The middle of the whole sphere is no direction.
-            direction: world_from_cuts * region.direction.try_normalize().unwrap_or(DVec3::Y),
+            direction: world_from_cuts * towards(region.direction),
             weight: region.power.map(|power| power * count),
             solid_angle: region.solid_angle * count,
         };
@@ -331,7 +332,8 @@ mod tests {
     fn a_coarser_cut_is_joined_from_a_finer_one() {
         let map = Environment::studio();
         let sphere = Sphere::new(unturned(&map));
-        for fewer in [1, 4, 64, 256] {
+        assert!(sphere.directions(0, 7).is_empty());
+        for fewer in [0, 1, 4, 5, 64, 256] {
             let [fine, joined] = sphere.directions_of_two_cuts(256, fewer, 7);
             let own = sphere.directions(fewer, 7);
             assert_eq!((fine.len(), joined.len()), (256, own.len()));
@@ -344,6 +346,16 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// Roundings are no direction: that of a constant map's whole sphere is an axis of the cuts.
+    #[test]
+    fn the_middle_of_the_sphere_is_no_direction() {
+        let map = Environment::constant([1.0; 3]);
+        let sphere = Sphere::new(unturned(&map));
+        let [_, joined] = sphere.directions_of_two_cuts(16, 1, 7);
+        let axis = Sphere::map_from_cuts(7) * DVec3::Y;
+        assert_eq!([joined[0].direction, sphere.directions(1, 7)[0].direction], [axis; 2]);
     }
 
     #[test]
