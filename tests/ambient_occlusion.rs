@@ -235,9 +235,9 @@ fn a_mirror_shows_what_is_occluded() {
     made.add(Shape::panel(0.1, 0.1), polished, turned(DVec3::X, 135.0, DVec3::new(0.1, -0.5, 0.0)));
     made.camera(DVec3::new(0.1, -0.5, -3.0), DVec3::new(0.1, -0.5, 0.0), orthographic(0.02));
     let got = film(&gpu, &made.0, &map, [16, 16], &["reflection=ray", "samples=16", "indirect=occlusion:64"]);
-    // Sixteen directions for each of 16 samples, about other axes in each pixel of a square. The mean of their ratios is
-    // not the ratio of their means: about the first axes 8 % of the light are missing. Without visibility 40 % would be
-    // too much.
+    // Sixteen directions for each of 16 samples, about other axes in each pixel of a square. The mean of their ratios
+    // is not the ratio of their means: about the first axes 8 % of the light are missing. Without visibility 40 % would
+    // be too much.
     let sphere = Sphere::new(Sky { map: &map, intensity: 1.0, rotation: 0.0 });
     let p = DVec3::new(0.1, -(25.0_f64 - 0.01).sqrt(), 0.0);
     let radiosity = 0.6 * 0.5 / (1.0 - 0.6 * 0.5);

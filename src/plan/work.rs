@@ -234,7 +234,8 @@ impl Plan {
         }
     }
 
-    /// Directions of ambient occlusion for one sample of that square: at all primary surfaces, and at all that rays meet.
+    /// Directions of ambient occlusion for one sample of that square: at all primary surfaces, and at all that rays
+    /// meet.
     #[must_use]
     pub fn occlusion_directions(&self) -> [u32; 2] {
         [self.occlusion_rays(), self.occlusion_rays_at_hits()].map(|rays| rays * self.occlusion_pattern().pow(2))

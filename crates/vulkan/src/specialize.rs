@@ -170,7 +170,8 @@ impl Module<'_> {
 ///
 /// `constants` are pairs of id and value; the others keep their defaults. The result computes the same as a driver that
 /// specialises `words`. Decided branches become unconditional, and a phi loses the operands of unreachable
-/// predecessors; that of a loop whose continue target is unreachable gets an undefined one for it. Nothing else changes.
+/// predecessors; that of a loop whose continue target is unreachable gets an undefined one for it. Nothing else
+/// changes.
 ///
 /// # Panics
 /// When the words are not SPIR-V, or have constants of other than 32 bits: glslang's output for Etalon's shaders has
