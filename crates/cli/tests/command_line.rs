@@ -38,10 +38,8 @@ const SMALL: [&str; 6] = ["--size", "32x18", "--device", "cpu", "--set", "sample
 
 /// Runs the program with bytes on its standard input; returns the bytes of its standard output as well.
 fn fed(folder: &Path, arguments: &[&str], input: &[u8]) -> (Vec<u8>, Run) {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_etalon"))
+    let mut child = program::command(folder)
         .args(arguments)
-        .current_dir(folder)
-        .env("XDG_CACHE_HOME", folder.join("cache"))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -544,10 +542,8 @@ fn ctrl_c_keeps_the_picture_where_asked() {
             "--device",
             "cpu",
         ];
-        let mut child = Command::new(env!("CARGO_BIN_EXE_etalon"))
+        let mut child = program::command(at)
             .args([&draw[..], &["-o", name], more].concat())
-            .current_dir(at)
-            .env("XDG_CACHE_HOME", at.join("cache"))
             .stdout(Stdio::null())
             .stderr(std::fs::File::create(at.join("stderr")).expect("a file"))
             .spawn()

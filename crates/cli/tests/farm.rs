@@ -287,10 +287,8 @@ fn a_part_that_is_told_to_end_keeps_what_it_has() {
     let mut ended = None;
     let mut kept = Vec::new();
     for attempt in 0..40 {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_etalon"))
+        let mut child = program::command(at)
             .args(line.split(' '))
-            .current_dir(at)
-            .env("XDG_CACHE_HOME", at.join("cache"))
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()

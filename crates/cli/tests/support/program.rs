@@ -46,18 +46,22 @@ fn cache_of_driver() -> PathBuf {
     found.unwrap_or_else(std::env::temp_dir)
 }
 
-/// In `folder`, with a cache of its own there and these variables beside the machine's.
-pub fn etalon(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_etalon"))
-        .args(arguments)
+/// The program in `folder`, with a cache of its own there.
+pub fn command(folder: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_etalon"));
+    command
         .current_dir(folder)
         .env("XDG_CACHE_HOME", folder.join("cache"))
         .env("MESA_SHADER_CACHE_DIR", cache_of_driver())
         .env_remove("RUST_BACKTRACE")
-        .env_remove("RUST_LOG")
-        .envs(variables.iter().copied())
-        .output()
-        .expect("the program starts");
+        .env_remove("RUST_LOG");
+    command
+}
+
+/// Its end, with these variables beside the machine's.
+pub fn etalon(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Run {
+    let run = command(folder).args(arguments).envs(variables.iter().copied()).output();
+    let output = run.expect("the program starts");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     Run { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
 }

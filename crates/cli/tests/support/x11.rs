@@ -73,13 +73,11 @@ impl<'a> Viewer<'a> {
 
     /// The same with some variables of the environment.
     pub fn open_with(display: &'a Display, folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Self {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_etalon"))
+        let mut program = super::program::command(folder)
             .arg("view")
             .args(arguments)
-            .current_dir(folder)
             .env("DISPLAY", &display.name)
             .env_remove("WAYLAND_DISPLAY")
-            .env("XDG_CACHE_HOME", folder.join("cache"))
             .env("XDG_CONFIG_HOME", folder.join("config"))
             .envs(variables.iter().copied())
             .stdout(Stdio::piped())
