@@ -1,8 +1,8 @@
 //! Optimised SPIR-V of earlier builds, by what it was made from. Optimisation takes most of the time of a build, and
-//! one edit changes few programs.
+//! one edit changes few programs, and a comment none.
 
 use std::fs;
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::hash::{DefaultHasher, Hash, Hasher as _};
 use std::path::{Path, PathBuf};
 
 /// Largest number of entries: some five builds with all shaders changed. Beyond it, the oldest are removed.
@@ -14,7 +14,7 @@ pub(crate) struct Cache {
     folder: Option<PathBuf>,
 }
 
-/// What code was made from: every text that the compiler read, and its settings.
+/// What code was made from: the compiler's unoptimised module, which comments do not change, and all settings.
 pub(crate) struct Key {
     // Two hashes of 64 bits with different beginnings: a chance of 1e-33 that two of 3000 entries are confused.
     hashes: [DefaultHasher; 2],
@@ -27,8 +27,8 @@ impl Key {
         Self { hashes }
     }
 
-    pub(crate) fn add(&mut self, text: &str) {
-        self.hashes.iter_mut().for_each(|hash| text.hash(hash));
+    pub(crate) fn add(&mut self, part: &(impl Hash + ?Sized)) {
+        self.hashes.iter_mut().for_each(|hash| part.hash(hash));
     }
 
     fn name(&self) -> String {
@@ -90,7 +90,7 @@ mod tests {
         let cache = Cache::beside(&out);
         let key = |texts: &[&str]| {
             let mut key = Key::new();
-            texts.iter().for_each(|text| key.add(text));
+            texts.iter().for_each(|text| key.add(*text));
             key
         };
         let made = |texts: &[&str], words: &[u32]| cache.words(&key(texts), || Ok::<_, ()>(words.to_vec()));

@@ -1,7 +1,6 @@
 //! GLSL to SPIR-V by glslang: used by build.rs for all shaders, and by the viewer for changed shaders (feature
 //! `reload`).
 
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +15,8 @@ use super::interface::{Interface, PassSlots};
 use super::optimise::Optimiser;
 use super::reflect::Stage;
 
-/// Maps each named item of `work` in parallel, with one thread per core; each thread has its own `tool`.
+/// Maps each named item of `work` in parallel, from the last one on, with one thread per core; each thread has its own
+/// `tool`.
 pub(crate) fn on_all_cores<Tool, W: Send, R: Send>(
     work: impl IntoIterator<Item = (String, W)>,
     tool: impl Fn() -> Result<Tool> + Sync,
@@ -115,22 +115,22 @@ impl Recipe {
         let (kinds, texts) = read(paths)?;
         let slots = self.interface.pass_slots(&texts)?;
         let stages = kinds.iter().zip(&texts);
-        stages.map(|(&kind, (name, text))| self.plain(kind, name, text, &slots, &RefCell::new(Key::new()))).collect()
+        stages.map(|(&kind, (name, text))| Ok(self.plain(kind, name, text, &slots)?.1)).collect()
     }
 
-    /// The module that is reflected. rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the declarations are the
-    /// same in 1.5.
+    /// The module that is reflected, and its words. rspirv 0.13 cannot load SPIR-V 1.6's OpExecutionModeId; the
+    /// declarations are the same in 1.5.
     fn plain(
         &self,
         kind: shaderc::ShaderKind,
         name: &str,
         text: &str,
         slots: &PassSlots,
-        read: &RefCell<Key>,
-    ) -> Result<Module> {
+    ) -> Result<(Vec<u32>, Module)> {
         let zero = shaderc::OptimizationLevel::Zero;
-        let words = self.words(kind, name, text, slots, zero, shaderc::SpirvVersion::V1_5, &[], read)?;
-        rspirv::dr::load_words(words).map_err(|e| format!("{name}: reflection: {e:?}"))
+        let words = self.words(kind, name, text, slots, zero, shaderc::SpirvVersion::V1_5, &[])?;
+        let module = rspirv::dr::load_words(&words).map_err(|e| format!("{name}: reflection: {e:?}"))?;
+        Ok((words, module))
     }
 
     /// Compiles a source text under a name.
@@ -141,19 +141,18 @@ impl Recipe {
     fn compile(&self, kinds: &[shaderc::ShaderKind], texts: &[(String, String)]) -> Result<Program> {
         let slots = self.interface.pass_slots(texts)?;
         let stage = |(&kind, (name, text)): (&shaderc::ShaderKind, &(String, String))| -> Result<Stage> {
-            let read = RefCell::new(Key::new());
-            let module = self.plain(kind, name, text, &slots, &read)?;
+            let (words, module) = self.plain(kind, name, text, &slots)?;
             let version = shaderc::SpirvVersion::V1_6;
-            // What the compiler has just read, and all else that decides the code.
-            let mut key = read.into_inner();
+            // What the compiler made of the text, and all else that decides the code.
+            let mut key = Key::new();
+            key.add(&words);
             let settings = format!("{kind:?} {version:?} {:?}", self.without);
             [&*settings, &*self.sample, self.optimiser.version()].into_iter().for_each(|text| key.add(text));
             let code = [include_str!("compile.rs"), include_str!("compact.rs"), include_str!("optimise.rs")];
-            code.iter().for_each(|code| key.add(code));
-            let unread = RefCell::new(Key::new());
+            code.iter().for_each(|code| key.add(*code));
             let level = self.optimiser.level_of_compiler();
             let make = || {
-                let words = self.words(kind, name, text, &slots, level, version, &self.without, &unread)?;
+                let words = self.words(kind, name, text, &slots, level, version, &self.without)?;
                 compacted(self.optimiser.optimised(name, words)?)
             };
             let words = self.cache.words(&key, make)?;
@@ -173,7 +172,6 @@ impl Recipe {
         level: shaderc::OptimizationLevel,
         version: shaderc::SpirvVersion,
         without: &[String],
-        read: &RefCell<Key>,
     ) -> Result<Vec<u32>> {
         let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
         options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
@@ -184,11 +182,9 @@ impl Recipe {
             let resolved = self.root.join(wanted);
             let content = fs::read_to_string(&resolved).map_err(|e| format!("{from} includes \"{wanted}\": {e}"))?;
             let content = self.interface.numbered(&content, slots, without)?;
-            read.borrow_mut().add(&content);
             Ok(shaderc::ResolvedInclude { resolved_name: resolved.display().to_string(), content })
         });
         let source = self.interface.numbered(source, slots, without)?;
-        read.borrow_mut().add(&source);
         let compiled = self.compiler.compile_into_spirv(&source, kind, name, "main", Some(&options));
         let artifact = compiled.map_err(|e| match e {
             shaderc::Error::CompilationError(_, log) => log,

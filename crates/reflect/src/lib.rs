@@ -45,8 +45,11 @@ pub fn build(shaders: &Path, out_dir: &Path, without: &[String]) -> Result<(), S
     if let Some(name) = without.iter().find(|name| recipe.interface.owner("constant", name).is_none()) {
         return Err(format!("no shader has a constant {name}"));
     }
+    let mut work: Vec<_> = programs(shaders)?.into_iter().collect();
+    // The longest first, so that none is left over at the end.
+    work.sort_by_cached_key(|(_, paths)| paths.iter().map(|path| size_with_includes(shaders, path)).sum::<u64>());
     let programs = compile::on_all_cores(
-        programs(shaders)?,
+        work,
         || Recipe::new(shaders, without.to_vec(), cache.clone()),
         |recipe, paths| {
             let program = recipe.program(&paths)?;
@@ -146,6 +149,13 @@ fn programs(shaders: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
 fn sources(shaders: &Path, name: &str) -> Result<Vec<PathBuf>> {
     let all = files(&shaders.join("pass"))?;
     Ok(all.into_iter().filter(|path| stem(path) == name).collect())
+}
+
+/// Bytes of a stage's file and of all that it includes.
+fn size_with_includes(shaders: &Path, path: &Path) -> u64 {
+    let mut parts = BTreeSet::new();
+    include(shaders, path.to_owned(), &mut parts);
+    parts.iter().filter_map(|part| fs::metadata(part).ok()).map(|of| of.len()).sum()
 }
 
 fn include(shaders: &Path, path: PathBuf, parts: &mut BTreeSet<PathBuf>) {
