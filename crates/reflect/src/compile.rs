@@ -143,12 +143,18 @@ impl Recipe {
         let stage = |(&kind, (name, text)): (&shaderc::ShaderKind, &(String, String))| -> Result<Stage> {
             let (words, module) = self.plain(kind, name, text, &slots)?;
             let version = shaderc::SpirvVersion::V1_6;
-            // What the compiler made of the text, and all else that decides the code.
+            // What the compiler made of the text, and all else that decides the code. What follows a `discard` in its
+            // block counts in SPIR-V 1.6 alone: no shader has such.
             let mut key = Key::new();
             key.add(&words);
             let settings = format!("{kind:?} {version:?} {:?}", self.without);
             [&*settings, &*self.sample, self.optimiser.version()].into_iter().for_each(|text| key.add(text));
-            let code = [include_str!("compile.rs"), include_str!("compact.rs"), include_str!("optimise.rs")];
+            let code = [
+                include_str!("compile.rs"),
+                include_str!("interface.rs"),
+                include_str!("compact.rs"),
+                include_str!("optimise.rs"),
+            ];
             code.iter().for_each(|code| key.add(*code));
             let level = self.optimiser.level_of_compiler();
             let make = || {
