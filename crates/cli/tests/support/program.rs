@@ -46,7 +46,7 @@ fn cache_of_driver() -> PathBuf {
     found.unwrap_or_else(std::env::temp_dir)
 }
 
-/// The program in `folder`, with a cache of its own there.
+/// The program in `folder`, with a cache of its own there; what the driver compiled is shared.
 pub fn command(folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_etalon"));
     command
@@ -58,7 +58,7 @@ pub fn command(folder: &Path) -> Command {
     command
 }
 
-/// Its end, with these variables beside the machine's.
+/// Runs it to its end, with these variables beside the machine's.
 pub fn etalon(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> Run {
     let run = command(folder).args(arguments).envs(variables.iter().copied()).output();
     let output = run.expect("the program starts");
