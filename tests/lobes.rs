@@ -5,7 +5,7 @@ use etalon::frame::Settings;
 use etalon::optics::brdf;
 use etalon::optics::fresnel::fresnel_dielectric;
 use etalon::scene::environment::Environment;
-use etalon::scene::{Material, Scene};
+use etalon::scene::{Material, Projection, Scene};
 use etalon::study::shape::Shape;
 use etalon_testing::gpu::Gpu;
 use etalon_testing::made::{Made, lambert, orthographic, unlit};
@@ -139,6 +139,33 @@ fn light_lost_to_single_scattering_is_given_back_to_rays() {
         [0, 1, 2].map(|i| single[i] * compensation[i])
     };
     agrees("compensated", metal(0.8), &["lobes=1", "brdf=ggx-multi"], expected);
+}
+
+/// Rays of rough lobes see the environment filtered over their part of the lobe: four samples of a checkerboard of texels
+/// have its mean, as in even light. Clear mirrors see its texels.
+#[test]
+fn few_samples_of_a_rough_lobe_see_all_of_the_environment_in_it() {
+    let gpu = Gpu::open();
+    let radiance = (0..128 * 256).map(|i| [if (i / 256 + i % 256) % 2 == 0 { 2.0 } else { 0.0 }; 3]).collect();
+    let chequered = Environment { name: "chequered".to_owned(), width: 256, height: 128, radiance };
+    // Of each pixel: its radiance by what it would be in even light.
+    let seen = |roughness: f32| -> Vec<f64> {
+        let mut made = Made::new("chequered");
+        let white = Material { base_color: [1.0; 4], ..metal(roughness) };
+        made.add(Shape::panel(40.0, 40.0), white, DAffine3::IDENTITY);
+        made.camera(V * 10.0, DVec3::ZERO, Projection::Perspective { fov_y: 0.5, near: None });
+        let [seen, even] = [&chequered, &Environment::constant([1.0; 3])]
+            .map(|environment| gpu.shot(&made.0, Some(environment), settings(&["samples=4", "lobes=0.5"])).1);
+        let pairs = seen.rgba.iter().zip(&even.rgba).filter(|(_, even)| even[0] > 0.0);
+        pairs.map(|(seen, even)| f64::from(seen[0] / even[0])).collect()
+    };
+    let far = |pixels: &[f64], by: f64| pixels.iter().filter(|x| (*x - 1.0).abs() > by).count();
+    let (rough, clear) = (seen(0.5), seen(0.0));
+    // Without the filter a tenth of the pixels would have four bright texels, or four dark ones, and half would be off by 0.5.
+    let (off, kept) = (far(&rough, 0.1), far(&clear, 0.3));
+    eprintln!("{off} of {} rough pixels are off, {kept} of {} clear ones show texels", rough.len(), clear.len());
+    assert!(rough.len() > 700 && off * 100 < rough.len(), "{off} of {}", rough.len());
+    assert!(kept * 10 > clear.len(), "{kept} of {}", clear.len());
 }
 
 /// What is rougher than the knob says sends no rays: without light from all around nothing is mirrored.

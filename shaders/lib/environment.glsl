@@ -32,6 +32,15 @@ vec3 environment_radiance(vec3 direction) {
     return light_of_environment(textureLod(sky, at, 0.0).rgb);
 }
 
+// Mean radiance around a direction, over about a square of `width` radians a side: the mip level whose texels are as large.
+// A row of the map is shorter by the sine of its angle to the pole.
+vec3 environment_radiance(vec3 direction, float width) {
+    vec3 d = into_environment(direction);
+    float texels = width * float(textureSize(sky, 0).x) * (0.5 * INV_PI) * inversesqrt(sqrt(max(1.0 - d.y * d.y, 1e-6)));
+    float level = texels > 1.0 ? log2(texels) : 0.0;
+    return light_of_environment(textureLod(sky, equirectangular_from_direction(d), level).rgb);
+}
+
 // Mip level of the prefiltered map whose texels are 1/16 of the lobe: α = 16 / width (pass/prefilter.comp).
 float prefiltered_level(float alpha) {
     float first = environment.width * alpha * 0.0625;

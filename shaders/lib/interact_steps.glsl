@@ -109,8 +109,8 @@ Branch last_branch() {
     return ray;
 }
 
-void look(vec3 direction, vec3 throughput) {
-    around += throughput * (ENVIRONMENT ? environment_radiance(direction) : vec3(0.0));
+void look(vec3 direction, vec3 throughput, float width) {
+    around += throughput * (ENVIRONMENT ? environment_radiance(direction, width) : vec3(0.0));
 }
 
 // Reads and writes what the tree has gathered.

@@ -48,11 +48,19 @@ uint first_event = 0; // of the current branch, in the values of FIRST_EVENT; 0 
 bool has_room();
 // Lets a branch wait: the last one is followed first.
 void push(Branch branch);
-// Adds the environment's radiance in a direction to `around`.
-void look(vec3 direction, vec3 throughput);
+// Adds the environment's radiance around a direction, over `width` radians, to `around`.
+void look(vec3 direction, vec3 throughput, float width);
 
 vec3 wanted(uint events, vec3 light) {
     return FIRST_EVENT == 0 || events >> 10 == FIRST_EVENT ? light : vec3(0.0);
+}
+
+// Angle over which a branch sees the environment: that of its cone which rough lobes have added, less with more samples, which
+// share it. So few samples see the whole lobe (filtered importance sampling, Křivánek and Colbert 2008), as in textures. 0
+// without rough lobes: what is clear stays clear.
+float width_by_lobes(Branch ray) {
+    float of_pixel = camera.orthographic != 0 ? 0.0 : trace_terms.pixel_angle;
+    return ROUGH ? (ray.spread - of_pixel) * exp2(trace_terms.lod_bias) : 0.0;
 }
 
 void send(Branch branch) {
@@ -63,7 +71,7 @@ void send(Branch branch) {
     // A branch that is not followed gets the environment's radiance: a better estimate than black.
     if (weight > 0.0 && !follows) {
         lost += weight;
-        look(branch.direction, wanted(branch.events, branch.throughput));
+        look(branch.direction, wanted(branch.events, branch.throughput), width_by_lobes(branch));
     }
 }
 
@@ -118,7 +126,7 @@ void leave_scene(Branch ray) {
     if (BLURRED_BACKGROUND && direct) {
         sum += wanted(ray.events, ray.throughput) * background_radiance(ray.direction);
     } else if (!clear) {
-        look(ray.direction, wanted(ray.events, ray.throughput));
+        look(ray.direction, wanted(ray.events, ray.throughput), width_by_lobes(ray));
     }
     escaped += clear ? (ray.throughput.r + ray.throughput.g + ray.throughput.b) * (1.0 / 3.0) : 0.0;
 }

@@ -28,6 +28,7 @@ uint waiting = 0;
 const int MOST_LOOKS = 2 * MOST_SENT;
 vec3 looks_at[MOST_LOOKS];
 vec3 looks_with[MOST_LOOKS];
+float looks_wide[MOST_LOOKS];
 uint looks = 0;
 uint reflection_rays = 0;
 uint refraction_rays = 0;
@@ -42,10 +43,11 @@ void push(Branch branch) {
     sent_now++;
 }
 
-void look(vec3 direction, vec3 throughput) {
+void look(vec3 direction, vec3 throughput, float width) {
     for (int i = 0; i < MOST_LOOKS; i++) {
         looks_at[i] = i == looks ? direction : looks_at[i];
         looks_with[i] = i == looks ? throughput : looks_with[i];
+        looks_wide[i] = i == looks ? width : looks_wide[i];
     }
     looks++;
 }
@@ -53,11 +55,12 @@ void look(vec3 direction, vec3 throughput) {
 // Makes all pending lookups in one place of the code: a sampled image is a call that spills every register.
 void see_environment() {
     do {
-        vec3 seen = ENVIRONMENT ? environment_radiance(looks_at[0]) : vec3(0.0);
+        vec3 seen = ENVIRONMENT ? environment_radiance(looks_at[0], looks_wide[0]) : vec3(0.0);
         around += looks > 0 ? looks_with[0] * seen : vec3(0.0);
         for (int i = 0; i < MOST_LOOKS - 1; i++) {
             looks_at[i] = looks_at[i + 1];
             looks_with[i] = looks_with[i + 1];
+            looks_wide[i] = looks_wide[i + 1];
         }
         looks -= looks > 0 ? 1 : 0;
     } while (looks > 0);
