@@ -17,7 +17,7 @@ use std::sync::Arc;
 use anyhow::{Result, bail, ensure};
 
 pub use self::drawing::Drawing;
-pub use self::readback::shown;
+pub use self::readback::{denoised, shown};
 pub use self::rendered::{NotFinite, Progress, Rendered, Sums, Work};
 pub use self::settings::{Background, NEUTRAL_GREY, Settings};
 use self::settings::{check_size, display_background};
@@ -30,6 +30,7 @@ use crate::pass::ambient::ambient;
 use crate::pass::background::background;
 use crate::pass::classify::{classify, classify_fragments};
 use crate::pass::composite::{Behind, composite};
+use crate::pass::denoise::denoise;
 use crate::pass::fragments::{FragmentLists, fragments};
 use crate::pass::gbuffer::gbuffer;
 use crate::pass::interact::interact;
@@ -419,6 +420,9 @@ impl Renderer {
             let mut frame = Frame::new(&self.device);
             let (of_sums, block) = self.samples_of_sums(samples, drawing.count);
             join(&mut frame, &self.targets.sums, &of_sums, block, film)?;
+            if let Some(with) = self.targets.denoising.as_ref().filter(|_| samples > 1) {
+                denoise(&mut frame, with, (&self.targets.sums, &of_sums, block), film)?;
+            }
             times.add(frame.finish()?);
         }
         times.add(self.show(samples, drawing.count)?.finish()?);
@@ -667,7 +671,17 @@ impl Renderer {
             frame.compile_where_told()?;
             passes.extend(frame.plan());
         }
-        for frame in [self.sample(count, 0)?, self.add(&drawing, 0)?, self.show(count, count)?] {
+        let last = match (&self.targets.film, &self.targets.denoising) {
+            (Some(film), Some(with)) => {
+                let mut frame = Frame::new(&self.device);
+                let (of_sums, block) = self.samples_of_sums(count, count);
+                denoise(&mut frame, with, (&self.targets.sums, &of_sums, block), film)?;
+                Some(frame)
+            }
+            _ => None,
+        };
+        let frames = [Some(self.sample(count, 0)?), Some(self.add(&drawing, 0)?), last, Some(self.show(count, count)?)];
+        for frame in frames.into_iter().flatten() {
             frame.compile_where_told()?;
             passes.extend(frame.plan());
         }

@@ -13,6 +13,7 @@ use crate::gpu::{Buffer, Device, Frame, Image, ImageDesc, Place};
 use crate::image::halves::{SampleError, error_of_halves};
 use crate::image::png;
 use crate::pass::aov::aov;
+use crate::pass::denoise::{Denoising, denoise};
 use crate::pass::gbuffer::gbuffer;
 use crate::pass::sum::Sum;
 use crate::pass::tonemap::{Display, tonemap};
@@ -210,6 +211,33 @@ impl Renderer {
         let [width, height] = self.settings.size;
         png::encode_png(width, height, &rendered.display, rendered.has_alpha)
     }
+}
+
+/// Denoises a film that was rendered elsewhere, the mean of the two `halves`: means of as many even and odd samples.
+/// Bit for bit what a renderer makes of them.
+///
+/// # Errors
+/// When the driver fails.
+pub fn denoised(device: &Arc<Device>, film: &Picture, halves: &[Picture; 2]) -> Result<Picture> {
+    let size = [film.width, film.height];
+    let usage = vk::ImageUsageFlags::STORAGE;
+    let desc = ImageDesc::flat(vk::Format::R32G32B32A32_SFLOAT, size[0], size[1], usage);
+    let image = Image::new(device, "film", desc)?;
+    let target = Buffer::new(device, "film read back", size_of_val(&film.rgba[..]) as u64, Place::Readback)?;
+    let staged = |picture: &Picture| Buffer::with_data(device, "staging", &picture.rgba);
+    let sources = [staged(&halves[0])?, staged(&halves[1])?, staged(film)?];
+    let sums = [Sum::new(device, "even samples", size, 1, 0)?, Sum::new(device, "odd samples", size, 1, 0)?];
+    let with = Denoising::new(device, size)?;
+    let mut frame = Frame::new(device);
+    for (source, image) in sources.iter().zip([&sums[0].total, &sums[1].total, &image]) {
+        frame.upload("upload samples", source, image, 0, &[0]);
+    }
+    denoise(&mut frame, &with, (&sums, &[1, 1], 1), &image)?;
+    frame.download("read film", &image, &target);
+    frame.read_back(&target);
+    frame.finish()?;
+    let rgba = target.read(|all| bytemuck::pod_collect_to_vec::<u8, [f32; 4]>(&all[..size_of_val(&film.rgba[..])]));
+    Ok(Picture { rgba, ..film.clone() })
 }
 
 /// Tone maps a film that was rendered elsewhere, with these settings: RGBA8 (sRGB-encoded, rows from the top), whether

@@ -9,6 +9,7 @@ use super::Part;
 use super::settings::Settings;
 use crate::gpu::{Device, Image, ImageDesc};
 use crate::pass::classify::{RayTiles, WorkLists};
+use crate::pass::denoise::Denoising;
 use crate::pass::fragments::FragmentLists;
 use crate::pass::gbuffer::GBuffer;
 use crate::pass::part::PartOnDevice;
@@ -35,6 +36,7 @@ pub(super) struct Targets {
     pub(super) sums: Vec<Sum>,
     /// Mean of the samples, when it is not one of the sums.
     pub(super) film: Option<Image>,
+    pub(super) denoising: Option<Denoising>,
     pub(super) parts: Vec<PartOnDevice>,
     pub(super) paths: Option<PathsOnDevice>,
     pub(super) display: Display,
@@ -68,6 +70,7 @@ impl Targets {
             screen: OnScreen::new(device, plan, size)?,
             sums,
             film: if is_sum { None } else { Some(target("film")?) },
+            denoising: if plan.denoise { Some(Denoising::new(device, size)?) } else { None },
             parts: settings.parts.iter().map(part).collect::<Result<_>>()?,
             paths: plan
                 .paths

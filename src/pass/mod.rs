@@ -9,6 +9,7 @@ pub mod aov;
 pub mod background;
 pub mod classify;
 pub mod composite;
+pub mod denoise;
 pub mod fragments;
 pub mod gbuffer;
 pub mod interact;

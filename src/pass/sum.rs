@@ -108,23 +108,24 @@ impl Sum {
     }
 }
 
+/// The images of one or two sums after `samples` of each, total and open block, and whether each holds something; the
+/// shaders do not read those that do not.
+pub(super) fn images_of<'a>(sums: &'a [Sum], samples: &[u32], block: u32) -> ([&'a Image; 4], [u32; 4]) {
+    let images: Vec<Option<&Image>> = sums.iter().zip(samples).flat_map(|(sum, &of)| sum.images(of, block)).collect();
+    let image = |i: usize| images.get(i).copied().flatten();
+    let all = [0, 1, 2, 3];
+    (all.map(|i| image(i).unwrap_or(&sums[0].total)), all.map(|i| u32::from(image(i).is_some())))
+}
+
 /// Writes the mean of all samples of several sums into `film`; `samples` holds the number of samples of each sum.
 ///
 /// # Errors
 /// When the driver refuses a descriptor or a layout.
 pub fn join<'a>(frame: &mut Frame<'a>, sums: &'a [Sum], samples: &[u32], block: u32, film: &'a Image) -> Result<()> {
-    let images: Vec<Option<&Image>> = sums.iter().zip(samples).flat_map(|(sum, &of)| sum.images(of, block)).collect();
-    let image = |i: usize| images.get(i).copied().flatten();
-    // The shader does not read images that are absent.
-    let at = |i: usize| image(i).unwrap_or(&sums[0].total);
-    let has = |i: usize| u32::from(image(i).is_some());
-    let bind = join::Bind { total_a: at(0), open_a: at(1), total_b: at(2), open_b: at(3), film };
-    let push = join::Push {
-        scale: 1.0 / samples.iter().sum::<u32>() as f32,
-        has_total_a: has(0),
-        has_open_a: has(1),
-        has_total_b: has(2),
-        has_open_b: has(3),
-    };
+    let ([total_a, open_a, total_b, open_b], [has_total_a, has_open_a, has_total_b, has_open_b]) =
+        images_of(sums, samples, block);
+    let bind = join::Bind { total_a, open_a, total_b, open_b, film };
+    let scale = 1.0 / samples.iter().sum::<u32>() as f32;
+    let push = join::Push { scale, has_total_a, has_open_a, has_total_b, has_open_b };
     frame.compute_over("join sums", &bind, &join::Constants {}, &push, [film.desc().width, film.desc().height])
 }

@@ -9,7 +9,7 @@ use super::effect::{Cause, Decisions, ForcedEffects, Verdict};
 use super::facts::{Facts, Surroundings};
 use super::knobs::Knobs;
 use super::knobs::rungs::{
-    self, Absorption, Brdf, EffectId, Guiding, Indirect, LightSampler, Reflection, Refraction, Shadows,
+    self, Absorption, Brdf, Denoise, EffectId, Guiding, Indirect, LightSampler, Reflection, Refraction, Shadows,
 };
 use super::left_out::left_out;
 use super::surfaces::{
@@ -72,6 +72,7 @@ impl Plan {
         let rays = planner.rays(&transmission, &images, &lights, samples);
         let rough_transmission = planner.rough_transmission(&transmission, &lights, samples);
         let (bands, disperses) = planner.wavelengths(&transmission);
+        let denoise = planner.denoising(followed);
         let from_points = lights.directional + lights.local > 0 && paths.is_none();
         let shadow_maps = lights.shadows && knobs.shadows == Shadows::Map && from_points;
         let stored = if paths.is_some() { Stored::default() } else { Stored::of(knobs) };
@@ -115,6 +116,7 @@ impl Plan {
             stored,
             architecture: Architecture::default(),
             samples: knobs.samples.count(),
+            denoise,
             effects: decisions.effects,
             unread: scene.unread.clone(),
             warnings: left_out(&surfaces, knobs, &transmission, shadow_maps),
@@ -465,6 +467,18 @@ impl Planner<'_> {
         let photons = knobs.caustics.photons();
         let kept = decisions.decide_with(EffectId::Caustics, knobs.caustics.choice().allows(photons > 0), cause);
         if kept { photons } else { 0 }
+    }
+
+    /// Whether the picture is denoised: noise is told by the halves of the samples, independent in path tracing.
+    fn denoising(&mut self, followed: bool) -> bool {
+        let Self { decisions, knobs, .. } = self;
+        let cause = match (followed, knobs.samples.count()) {
+            (false, _) => Cause::against("path tracing is off"),
+            (_, 1) => Cause::against("one sample does not tell its noise"),
+            _ => Cause::of("paths are drawn at random"),
+        };
+        let by_knob = knobs.denoise.choice().allows(knobs.denoise != Denoise::Off);
+        decisions.decide_apart(EffectId::Denoising, by_knob, cause)
     }
 
     /// Number of bands of wavelengths, and whether dispersion splits rays by wavelength.

@@ -79,6 +79,8 @@ pub struct Plan {
     pub architecture: Architecture,
     /// Samples per pixel.
     pub samples: u32,
+    /// The picture is denoised by non-local means, which needs two sums of samples.
+    pub denoise: bool,
     /// Every effect with its state and reason.
     pub effects: Vec<Effect>,
     /// Textures and texture coordinates of the scene that are neither decoded nor uploaded, with reasons, one sentence

@@ -14,7 +14,7 @@ use super::report::{WorkFacts, WrittenFile};
 use super::setup::validated;
 use super::shard::display_settings;
 use super::{print, usage};
-use etalon::frame::shown;
+use etalon::frame::{denoised, shown};
 use etalon::gpu::Device;
 use etalon::image::halves::SampleError;
 use etalon::image::{Aov, Statistics, exr, file, png};
@@ -84,22 +84,27 @@ impl MergeArgs {
 pub fn run(args: &MergeArgs) -> Result<ExitCode> {
     let outputs = usage(args.outputs())?;
     args.output.iter().chain(&args.report).try_for_each(|path| file::check_writable(path))?;
-    let joined = join(&args.parts)?;
+    let mut joined = join(&args.parts)?;
     let settings = display_settings(&joined.identity);
-    let display = match outputs.iter().any(|(_, format)| *format == Format::Png) {
+    let shows = outputs.iter().any(|(_, format)| *format == Format::Png);
+    let display = match shows || joined.denoise {
         true => {
             let device = Device::open(&args.device.choice(), args.device.validate)?;
             let here = device_name(device.info());
-            // The device evaluates the tone curve too.
+            // The device evaluates the tone curve too, and denoises.
+            let without = if joined.denoise { "" } else { "; -o FILE.exr needs no device" };
             ensure!(
                 joined.identity.device == here,
-                "the parts were drawn on \"{}\", but this device is \"{}\" and may round differently; -o FILE.exr needs no device",
+                "the parts were drawn on \"{}\", but this device is \"{}\" and may round differently{without}",
                 joined.identity.device.join(", "),
                 here.join(", ")
             );
-            let display = shown(&device, &joined.film, &settings, joined.bands > 0)?;
+            if let Some(halves) = joined.halves.as_ref().filter(|_| joined.denoise) {
+                joined.film = denoised(&device, &joined.film, halves)?;
+            }
+            let display = if shows { Some(shown(&device, &joined.film, &settings, joined.bands > 0)?) } else { None };
             validated(&device)?;
-            Some(display)
+            display
         }
         false => None,
     };

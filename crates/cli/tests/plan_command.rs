@@ -123,7 +123,7 @@ fn what_is_left_out_has_a_price() {
         .collect();
     let mut alone = vec!["heterogeneous media", "quadrature", "prefiltered environment"];
     alone.extend(["emissive surfaces as lights", "analytic area lights", "light hierarchy", "path guiding"]);
-    alone.extend(["caustics of punctual lights", "dispersion"]);
+    alone.extend(["caustics of punctual lights", "dispersion", "denoising"]);
     assert_eq!(without, alone);
     assert!(of("material layers")["bytes"].as_i64() > Some(48 * 27 * 8), "{costs:?}");
     assert!(of("order-independent transparency")["pipelines"].as_i64() > Some(1), "{costs:?}");
@@ -152,9 +152,9 @@ fn everything_can_be_planned() {
         plan["effects"].as_array().expect("a list").iter().filter(|effect| effect["state"] == state).count()
     };
     assert!(count(&lean, "not needed") > 10);
-    // Bodies that touch are another picture, and so is dispersion. Light samples, by a hierarchy or not, have other
-    // roundings.
-    assert_eq!(count(&full, "not needed"), 5);
+    // Bodies that touch are another picture, and so are dispersion and a denoised one. Light samples, by a hierarchy or
+    // not, have other roundings.
+    assert_eq!(count(&full, "not needed"), 6);
     let reasons = full["effects"].to_string();
     assert!(reasons.contains("asked for, although no visible material uses it"), "{reasons}");
     assert!(full["pipelines"].as_array().expect("a list").len() > lean["pipelines"].as_array().expect("a list").len());

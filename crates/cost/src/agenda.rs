@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::command::set;
 use super::table::{Family, KnobState};
 use super::warm::Bench;
-use etalon::plan::rungs::{Caustics, Guiding};
+use etalon::plan::rungs::{Caustics, Denoise, Guiding};
 use etalon::plan::{EffectState, KNOBS, Knob, Knobs, Model, Plan};
 
 /// Change of one knob relative to a base.
@@ -235,7 +235,8 @@ impl Agenda {
 /// These knobs with another rung of `indirect`, and without what only paths use.
 #[must_use]
 pub fn with_indirect(knobs: &Knobs, rung: &str) -> Option<Knobs> {
-    Knobs { guiding: Guiding::Off, caustics: Caustics::Off, ..knobs.clone() }.with("indirect", rung)
+    Knobs { guiding: Guiding::Off, caustics: Caustics::Off, denoise: Denoise::Off, ..knobs.clone() }
+        .with("indirect", rung)
 }
 
 /// The reference's rungs with the indirect light of the presets without path tracing. A rung whose plan equals that of

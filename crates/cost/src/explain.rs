@@ -9,7 +9,7 @@ use serde::Serialize;
 use etalon::frame::{Renderer, Settings};
 use etalon::gpu::{Device, DeviceChoice};
 use etalon::plan::rungs::{
-    Absorption, Caustics, Colour, Guiding, Indirect, LightSampler, Lights, Reflection, Refraction, Shadows,
+    Absorption, Caustics, Colour, Denoise, Guiding, Indirect, LightSampler, Lights, Reflection, Refraction, Shadows,
 };
 use etalon::plan::{Choice, Effect, EffectId, EffectState, ForcedEffects, Knob, Knobs, Model};
 use etalon::prepare::Original;
@@ -187,9 +187,10 @@ fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
             vec![Lights::Area4.choice(), LightSampler::Resampled4.choice()]
         }
         EffectId::PathGuiding => [&paths[..], &[Lights::Area1.choice(), Guiding::Photons.choice()]].concat(),
+        EffectId::Denoising => [&paths[..], &[Denoise::NlMeans.choice()]].concat(),
         EffectId::Caustics => [&paths[..], &[Caustics::Photons16384.choice()]].concat(),
         _ if dropped_by == Indirect::Path.choice() => {
-            vec![Indirect::Ambient.choice(), Guiding::Off.choice(), Caustics::Off.choice()]
+            vec![Indirect::Ambient.choice(), Guiding::Off.choice(), Caustics::Off.choice(), Denoise::Off.choice()]
         }
         _ => {
             let recursive = Knobs::of(Model::Recursive);

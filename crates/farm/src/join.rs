@@ -6,6 +6,7 @@ use anyhow::{Result, bail, ensure};
 use etalon::frame::{TileShare, Work};
 use etalon::image::halves::{SampleError, error_of_halves};
 use etalon::image::{Aov, AovData, Picture};
+use etalon::plan::rungs::Denoise;
 
 use crate::identity::Identity;
 use crate::part::{Part, PartHeader, Split};
@@ -20,6 +21,8 @@ pub struct Joined {
     pub film: Picture,
     /// Half buffers: means of the even and of the odd samples; only of path tracing.
     pub halves: Option<[Picture; 2]>,
+    /// Whether the picture of one process would be denoised: the film is not yet ([`etalon::frame::denoised`]).
+    pub denoise: bool,
     /// Error estimated from the half buffers.
     pub error: Option<SampleError>,
     /// Additional layers.
@@ -149,5 +152,6 @@ fn whole(mut parts: Vec<Part>) -> Joined {
     };
     let frames = samples * bands.max(1);
     let work = work.of(identity.size, frames);
-    Joined { identity, film, halves: both, error, aovs, samples, bands, work, dropped, workers }
+    let denoise = both.is_some() && identity.knobs.get("denoise").is_some_and(|rung| rung != Denoise::Off.name());
+    Joined { identity, film, halves: both, denoise, error, aovs, samples, bands, work, dropped, workers }
 }

@@ -76,6 +76,8 @@ effects! {
         "a rough transmissive surface, with path tracing; a rough thin-walled one with punctual or area lights" => "code",
     Absorption = "absorption":
         "a solid that absorbs" => "code",
+    Denoising = "denoising":
+        "path tracing with 2 samples per pixel, with `denoise=nl-means`" => "three passes at the end, four images",
     CoincidentInterfaces = "coincident interfaces":
         "a solid whose surface touches another one, which only the BVH shows" => "code",
 }
@@ -102,6 +104,7 @@ knobs! {
     guiding: Guiding,
     caustics: Caustics,
     samples: Samples,
+    denoise: Denoise,
     colour: Colour,
     upsampling: Upsampling,
     arithmetic: Arithmetic,
@@ -570,6 +573,20 @@ impl Samples {
     pub const fn count(self) -> u32 {
         4_u32.pow(self as u32)
     }
+}
+
+knob! {
+    Denoise = "denoise" {
+        /// A mean with those pixels nearby that differ by no more than noise: faint detail may be lost.
+        NlMeans = "nl-means",
+        /// The mean of the pixel's own samples, with all of their noise.
+        Off = "off",
+    }
+    presets: [Off, Off, Off],
+    exact: Off,
+    lecture: [],
+    effects: [Denoising],
+    about: "denoising: pixels are averaged with those around them that differ by no more than noise (non-local means)",
 }
 
 macro_rules! spectral_about {
