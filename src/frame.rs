@@ -671,15 +671,12 @@ impl Renderer {
             frame.compile_where_told()?;
             passes.extend(frame.plan());
         }
-        let last = match (&self.targets.film, &self.targets.denoising) {
-            (Some(film), Some(with)) => {
-                let mut frame = Frame::new(&self.device);
-                let (of_sums, block) = self.samples_of_sums(count, count);
-                denoise(&mut frame, with, (&self.targets.sums, &of_sums, block), film)?;
-                Some(frame)
-            }
-            _ => None,
-        };
+        let mut last = None;
+        if let (Some(film), Some(with)) = (&self.targets.film, &self.targets.denoising) {
+            let frame = last.insert(Frame::new(&self.device));
+            let (of_sums, block) = self.samples_of_sums(count, count);
+            denoise(frame, with, (&self.targets.sums, &of_sums, block), film)?;
+        }
         let frames = [Some(self.sample(count, 0)?), Some(self.add(&drawing, 0)?), last, Some(self.show(count, count)?)];
         for frame in frames.into_iter().flatten() {
             frame.compile_where_told()?;

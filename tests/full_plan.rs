@@ -37,7 +37,7 @@ fn draw(gpu: &Gpu, scene: &Scene, knobs: &Knobs, forced: ForcedEffects) -> (Pict
 }
 
 /// Effects that no demand includes: each makes another picture, or one with other noise or roundings, wherever it is.
-const APART: [&str; 4] = ["coincident interfaces", "light hierarchy", "spectral rendering", "dispersion"];
+const APART: [&str; 5] = ["coincident interfaces", "light hierarchy", "spectral rendering", "dispersion", "denoising"];
 /// Those that only paths include.
 const SAMPLED: [&str; 2] = ["emissive surfaces as lights", "analytic area lights"];
 

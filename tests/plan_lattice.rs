@@ -681,7 +681,8 @@ fn any_two_effects_are_kept_together_and_apart() {
 }
 
 /// Effects of paths. Rough transmission is one of lamps behind thin surfaces too (tests/plan.rs, tests/light.rs).
-const OF_PATHS: [&str; 4] = ["path guiding", "caustics of punctual lights", "rough transmission", "path tracing"];
+const OF_PATHS: [&str; 5] =
+    ["path guiding", "caustics of punctual lights", "rough transmission", "path tracing", "denoising"];
 
 /// Effects of more lights than are here: tests/light_samples.rs has them.
 const OF_LIGHTS: [&str; 2] = ["analytic area lights", "light hierarchy"];

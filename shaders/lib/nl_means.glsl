@@ -5,7 +5,7 @@
 // 1. Compared is the radiance x as log(1 + 4 x): ratios of what is bright, about as an eye would, and a firefly is one pixel.
 // 2. Variance v of a pixel: half of the squared difference of the two pictures, its mean over 5x5 pixels.
 // 3. Distance of the pixels p and q: ((x_p − x_q)² − (v_p + min(v_p, v_q))) / (k² (v_p + v_q)), the mean over 3x3 pixels. Of a
-//    squared difference v_p + v_q is noise; min avoids that a pixel of much noise is like any other.
+//    squared difference v_p + v_q is noise; min keeps a very noisy pixel from being like any other.
 // 4. Weight: exp(−max(distance, 0)), times 4 v over the own variance of q where that is less than 1: what is far noisier than
 //    the pixels around it, a firefly, would make a square of light.
 // Without noise a pixel is averaged with equals alone, so it keeps its value; with more samples the picture converges.
@@ -21,8 +21,13 @@ const float NL_TOLERANCE = 0.6;  // k
 const float NL_OUTLIER = 4.0;    // own variance, in units of that around it, above which a pixel counts less
 // Against 0/0 where nothing is noise: there equals have distance 0, and all else is far away.
 const float NL_LEAST_VARIANCE = 1e-20;
-// A pixel has its own weight, of at least 4/25: less is that of one that is no number.
-const float NL_LEAST_WEIGHT = 0.1;
+// Variance of a pixel of which a half is not finite: it stays as it is, to be counted, and no other one takes of it. By bits, as a
+// compiler may assume that there is none.
+const float NL_NOT_FINITE = -1.0;
+const uint NL_INFINITY_BITS = 0x7f800000u;
+bool nl_is_finite(vec3 x) {
+    return all(lessThan(floatBitsToUint(x) & 0x7fffffffu, uvec3(NL_INFINITY_BITS)));
+}
 
 // Radiance as it is compared.
 vec3 as_compared(vec3 radiance) {
@@ -43,11 +48,11 @@ float nl_distance(vec3 p, vec3 q, float v_p, float v_q) {
 
 // What a pixel counts for others, by its own variance and that around it.
 float nl_trust(float own, float around) {
+    if (own == NL_NOT_FINITE) return 0.0;
     return own > NL_OUTLIER * around ? NL_OUTLIER * around / own : 1.0;
 }
 
-// No weight for a distance that is no number: NaN stays in its pixel, and is counted there.
 float nl_weight(float d) {
-    return d < 80.0 ? exp(-max(d, 0.0)) : 0.0;
+    return exp(-clamp(d, 0.0, 80.0));
 }
 #endif

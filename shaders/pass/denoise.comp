@@ -28,8 +28,8 @@ void main() {
         here_b[i] = imageLoad(guide_b, at);
     }
     // Sums of differences from the pixel: one among equals keeps its value to the last bit.
-    vec3 own_a = imageLoad(mean_a, pixel).rgb;
-    vec3 own_b = imageLoad(mean_b, pixel).rgb;
+    vec4 own_a = imageLoad(mean_a, pixel);
+    vec4 own_b = imageLoad(mean_b, pixel);
     vec3 more_a = vec3(0.0);
     vec3 more_b = vec3(0.0);
     float weights_a = 0.0;
@@ -51,14 +51,21 @@ void main() {
             // Each half by the other one's distance.
             float weight_a = trust * nl_weight(by_b / float(NL_PATCH));
             float weight_b = trust * nl_weight(by_a / float(NL_PATCH));
+            vec4 there_a = imageLoad(mean_a, other);
+            vec4 there_b = imageLoad(mean_b, other);
+            // Radiance is premultiplied by coverage: light stays among pixels of the same.
+            bool alike = there_a.a == own_a.a && there_b.a == own_b.a;
+            weight_a = alike ? weight_a : 0.0;
+            weight_b = alike ? weight_b : 0.0;
             weights_a += weight_a;
             weights_b += weight_b;
-            more_a += weight_a > 0.0 ? weight_a * (imageLoad(mean_a, other).rgb - own_a) : vec3(0.0);
-            more_b += weight_b > 0.0 ? weight_b * (imageLoad(mean_b, other).rgb - own_b) : vec3(0.0);
+            more_a += weight_a > 0.0 ? weight_a * (there_a.rgb - own_a.rgb) : vec3(0.0);
+            more_b += weight_b > 0.0 ? weight_b * (there_b.rgb - own_b.rgb) : vec3(0.0);
         }
     }
-    vec3 more = share_a * (more_a / max(weights_a, NL_LEAST_WEIGHT)) + (1.0 - share_a) * (more_b / max(weights_b, NL_LEAST_WEIGHT));
-    // Coverage is no light of paths: a dark surface and what lies beside it may be alike but for that.
+    // A pixel that is not finite has no weight of its own, and stays as it is.
+    if (here_a[NL_PATCH / 2].a == NL_NOT_FINITE) return;
+    vec3 more = share_a * (more_a / weights_a) + (1.0 - share_a) * (more_b / weights_b);
     vec4 mean = imageLoad(film, pixel);
     imageStore(film, pixel, vec4(mean.rgb + more, mean.a));
 }

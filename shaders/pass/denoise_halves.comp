@@ -25,10 +25,11 @@ void main() {
     if (has_open_b != 0) b += imageLoad(open_b, pixel);
     a *= scale_a;
     b *= scale_b;
-    vec3 compared_a = as_compared(a.rgb);
-    vec3 compared_b = as_compared(b.rgb);
+    bool counts = nl_is_finite(a.rgb) && nl_is_finite(b.rgb);
+    vec3 compared_a = counts ? as_compared(a.rgb) : vec3(0.0);
+    vec3 compared_b = counts ? as_compared(b.rgb) : vec3(0.0);
     imageStore(mean_a, pixel, a);
     imageStore(mean_b, pixel, b);
-    imageStore(guide_a, pixel, vec4(compared_a, variance_of_halves(compared_a, compared_b)));
+    imageStore(guide_a, pixel, vec4(compared_a, counts ? variance_of_halves(compared_a, compared_b) : NL_NOT_FINITE));
     imageStore(guide_b, pixel, vec4(compared_b, 0.0));
 }

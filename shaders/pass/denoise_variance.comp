@@ -17,8 +17,7 @@ void main() {
     for (int y = -NL_VARIANCE_REACH; y <= NL_VARIANCE_REACH; y++) {
         for (int x = -NL_VARIANCE_REACH; x <= NL_VARIANCE_REACH; x++) {
             float variance = imageLoad(guide_a, clamp(pixel + ivec2(x, y), ivec2(0), last)).a;
-            // What is no number, or no finite one, is not taken for noise.
-            bool counts = variance < 3.0e38;
+            bool counts = variance != NL_NOT_FINITE;
             sum += counts ? variance : 0.0;
             count += counts ? 1.0 : 0.0;
         }

@@ -36,6 +36,7 @@ pub(super) struct Targets {
     pub(super) sums: Vec<Sum>,
     /// Mean of the samples, when it is not one of the sums.
     pub(super) film: Option<Image>,
+    /// What denoises the film, not the sums: errors are those of the samples.
     pub(super) denoising: Option<Denoising>,
     pub(super) parts: Vec<PartOnDevice>,
     pub(super) paths: Option<PathsOnDevice>,

@@ -59,7 +59,7 @@ impl PartOnDevice {
         if plan.paths.is_some() {
             let why = format!(
                 "{name}: this layer is what single rays bring, and indirect=path follows paths instead; choose indirect=ambient \
-                 with guiding=off and caustics=off"
+                 with guiding=off, caustics=off and denoise=off"
             );
             return Err(Refused::error(Setting::Part, why));
         }

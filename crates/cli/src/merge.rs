@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use clap::{Args, ValueEnum as _};
 use serde::Serialize;
 
@@ -89,7 +89,9 @@ pub fn run(args: &MergeArgs) -> Result<ExitCode> {
     let shows = outputs.iter().any(|(_, format)| *format == Format::Png);
     let display = match shows || joined.denoise {
         true => {
-            let device = Device::open(&args.device.choice(), args.device.validate)?;
+            let why =
+                if joined.denoise { "joining parts that are denoised together" } else { "making a PNG of the parts" };
+            let device = Device::open(&args.device.choice(), args.device.validate).context(why)?;
             let here = device_name(device.info());
             // The device evaluates the tone curve too, and denoises.
             let without = if joined.denoise { "" } else { "; -o FILE.exr needs no device" };

@@ -65,7 +65,9 @@ fn parts_are_the_picture_of_one_run() {
     for (picture, split, of) in [
         // Paths in halves, more samples than blocks, and a number of parts that divides nothing.
         ("study:cornell --model global --set samples=256", "tiles", 5),
-        ("study:cornell --model global --set samples=256 --set denoise=nl-means", "samples", 5),
+        ("study:cornell --model global --set samples=256", "samples", 5),
+        // Denoised as a whole.
+        ("study:cornell --model global --set samples=16 --set denoise=nl-means", "tiles", 3),
         // An eye in water, which each part has to find.
         ("study:pool --model recursive --set samples=16", "samples", 2),
         // Rays, parts of the picture and layers of surfaces.

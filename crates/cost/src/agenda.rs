@@ -171,10 +171,10 @@ fn of_local(knob: &Knob, rung: &str) -> bool {
 }
 
 /// Rungs to which the reference's rungs are changed. Samples, light samples, the light sampler and path guiding change
-/// noise, which the presets show.
+/// noise, which the presets show. A denoised picture has other noise than its halves, by which these are compared.
 fn of_exact(knob: &Knob, rung: &str) -> bool {
     match knob.name {
-        "samples" | "colour" => false,
+        "samples" | "colour" | "denoise" => false,
         "lights" => rung != "points",
         "brdf" => rung == "ggx",
         _ => true,

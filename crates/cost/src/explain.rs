@@ -187,7 +187,6 @@ fn allowing(effect: EffectId, dropped_by: Choice) -> Vec<Choice> {
             vec![Lights::Area4.choice(), LightSampler::Resampled4.choice()]
         }
         EffectId::PathGuiding => [&paths[..], &[Lights::Area1.choice(), Guiding::Photons.choice()]].concat(),
-        EffectId::Denoising => [&paths[..], &[Denoise::NlMeans.choice()]].concat(),
         EffectId::Caustics => [&paths[..], &[Caustics::Photons16384.choice()]].concat(),
         _ if dropped_by == Indirect::Path.choice() => {
             vec![Indirect::Ambient.choice(), Guiding::Off.choice(), Caustics::Off.choice(), Denoise::Off.choice()]

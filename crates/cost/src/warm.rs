@@ -153,7 +153,8 @@ impl Bench<'_> {
     /// # Errors
     /// When the scene has nothing to draw.
     pub fn draws_all(&self, knobs: &Knobs) -> Result<bool> {
-        Ok(self.settings.share == TileShare::ALL || self.plan(knobs)?.screen != Screen::default())
+        let plan = self.plan(knobs)?;
+        Ok(self.settings.share == TileShare::ALL || plan.screen != Screen::default() || plan.denoise)
     }
 
     /// Warms up a renderer: uploads the scene and draws two samples, which compiles everything.

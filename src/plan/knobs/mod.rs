@@ -7,7 +7,7 @@ pub mod rungs;
 
 use super::refused::{Refused, Setting};
 use anyhow::Result;
-use rungs::{Caustics, Guiding, Indirect, Reflection, Refraction, Shadows};
+use rungs::{Caustics, Denoise, Guiding, Indirect, Reflection, Refraction, Shadows};
 pub use rungs::{KNOBS, Knob, Knobs, Model};
 
 impl Knob {
@@ -95,7 +95,7 @@ impl Knobs {
     /// # Errors
     /// One sentence with both and the nearest choice.
     pub fn check(&self) -> Result<()> {
-        let Self { shadows, reflection, refraction, indirect, guiding, caustics, .. } = *self;
+        let Self { shadows, reflection, refraction, indirect, guiding, caustics, denoise, .. } = *self;
         if indirect == Indirect::Path {
             let other = [
                 (shadows != Shadows::Ray).then(|| (shadows.to_string(), Shadows::Ray.to_string())),
@@ -105,7 +105,7 @@ impl Knobs {
             if let Some((chosen, nearest)) = other.into_iter().flatten().next() {
                 return Err(refused(format!(
                     "{chosen} contradicts indirect=path, whose paths meet every surface by rays; the nearest choice is \
-                     {nearest}, or indirect=ambient with guiding=off and caustics=off"
+                     {nearest}, or indirect=ambient with guiding=off, caustics=off and denoise=off"
                 )));
             }
         } else if guiding != Guiding::Off {
@@ -117,6 +117,11 @@ impl Knobs {
             return Err(refused(format!(
                 "{caustics} contradicts {indirect}: only paths look up photons; the nearest choice is indirect=path, or \
                  caustics=off"
+            )));
+        } else if denoise != Denoise::Off {
+            return Err(refused(format!(
+                "{denoise} contradicts {indirect}: only paths tell their noise; the nearest choice is indirect=path, or \
+                 denoise=off"
             )));
         }
         Ok(())

@@ -77,7 +77,7 @@ effects! {
     Absorption = "absorption":
         "a solid that absorbs" => "code",
     Denoising = "denoising":
-        "path tracing with 2 samples per pixel, with `denoise=nl-means`" => "three passes at the end, four images",
+        "path tracing with at least 2 samples per pixel, with `denoise=nl-means`" => "three passes at the end, four images",
     CoincidentInterfaces = "coincident interfaces":
         "a solid whose surface touches another one, which only the BVH shows" => "code",
 }
