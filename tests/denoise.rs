@@ -27,7 +27,7 @@ fn twin(halves: &[Picture; 2], first: f64) -> Vec<[f64; 3]> {
         square.map(|(i, j)| own[place(x + i, y + j)]).sum::<f64>() / 25.0
     };
     let variance: Vec<f64> = pixels().map(around).collect();
-    let trust = |q: usize| if own[q] > 4.0 * variance[q] { 4.0 * variance[q] / own[q] } else { 1.0 };
+    let outlier = |q: usize| if own[q] > 4.0 * variance[q] { 4.0 * variance[q] / own[q] } else { 1.0 };
     let filtered = |(x, y): (i32, i32), half: usize| {
         let guide = &compared[1 - half];
         let (mut sum, mut weights) = ([0.0; 3], 0.0);
@@ -45,7 +45,7 @@ fn twin(halves: &[Picture; 2], first: f64) -> Vec<[f64; 3]> {
             if (0..2).any(|k| halves[k].rgba[q][3] != halves[k].rgba[place(x, y)][3]) {
                 continue;
             }
-            let weight = (-(distance / 9.0).max(0.0)).exp() * trust(q);
+            let weight = (-(distance / 9.0).max(0.0)).exp() * outlier(q);
             weights += weight;
             for (c, sum) in sum.iter_mut().enumerate() {
                 *sum += weight * f64::from(halves[half].rgba[q][c]);
@@ -140,9 +140,9 @@ fn without_noise_no_bit_changes() {
     assert!(green(23) < green(24) && green(0) == green(23), "the edge");
 }
 
-/// Noise is told by two samples of path tracing.
+/// The variance is estimated from two samples of path tracing.
 #[test]
-fn pictures_without_chance_are_not_denoised() {
+fn only_path_tracing_of_several_samples_is_denoised() {
     let gpu = Gpu::open();
     let mut made = Made::new("floor");
     made.add(Shape::panel(8.0, 8.0), lambert([0.5; 3]), DAffine3::IDENTITY);

@@ -1,7 +1,7 @@
 // Denoising by non-local means: a pixel becomes the mean of those around it that differ from it by no more than noise.
-// Pixels are compared with all pixels around them, so texture and edges tell each other apart where single pixels are lost
+// Pixels are compared with all pixels around them, so a pixel of texture or of an edge finds its like where single pixels are lost
 // in noise. There are two pictures, of even and of odd samples. Each is filtered by weights of the other one, so that no
-// noise decides on its own weight, and their difference tells the variance.
+// noise decides on its own weight, and their difference estimates the variance.
 // 1. Compared is the radiance x as log(1 + 4 x): ratios of what is bright, about as an eye would, and a firefly is one pixel.
 // 2. Variance v of a pixel: half of the squared difference of the two pictures, its mean over 5x5 pixels.
 // 3. Distance of the pixels p and q: ((x_p − x_q)² − (v_p + min(v_p, v_q))) / (k² (v_p + v_q)), the mean over 3x3 pixels. Of a
@@ -29,8 +29,8 @@ bool nl_is_finite(vec3 x) {
     return all(lessThan(floatBitsToUint(x) & 0x7fffffffu, uvec3(NL_INFINITY_BITS)));
 }
 
-// Radiance as it is compared.
-vec3 as_compared(vec3 radiance) {
+// What pixels are compared by.
+vec3 log_radiance(vec3 radiance) {
     return log(1.0 + 4.0 * max(radiance, 0.0));
 }
 
@@ -46,8 +46,8 @@ float nl_distance(vec3 p, vec3 q, float v_p, float v_q) {
     return (dot(p - q, p - q) - noise) / scale;
 }
 
-// What a pixel counts for others, by its own variance and that around it.
-float nl_trust(float own, float around) {
+// Factor on the weight of a pixel, by its own variance and the mean around it.
+float nl_outlier_weight(float own, float around) {
     if (own == NL_NOT_FINITE) return 0.0;
     return own > NL_OUTLIER * around ? NL_OUTLIER * around / own : 1.0;
 }

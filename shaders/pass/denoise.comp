@@ -47,10 +47,10 @@ void main() {
                 by_a += nl_distance(here_a[i].rgb, there_a.rgb, here_b[i].a, there_b.a);
                 by_b += nl_distance(here_b[i].rgb, there_b.rgb, here_b[i].a, there_b.a);
             }
-            float trust = nl_trust(imageLoad(guide_a, other).a, imageLoad(guide_b, other).a);
+            float outlier = nl_outlier_weight(imageLoad(guide_a, other).a, imageLoad(guide_b, other).a);
             // Each half by the other one's distance.
-            float weight_a = trust * nl_weight(by_b / float(NL_PATCH));
-            float weight_b = trust * nl_weight(by_a / float(NL_PATCH));
+            float weight_a = outlier * nl_weight(by_b / float(NL_PATCH));
+            float weight_b = outlier * nl_weight(by_a / float(NL_PATCH));
             vec4 there_a = imageLoad(mean_a, other);
             vec4 there_b = imageLoad(mean_b, other);
             // Radiance is premultiplied by coverage: light stays among pixels of the same.

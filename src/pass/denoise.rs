@@ -1,4 +1,4 @@
-//! Denoising by non-local means: each half of the samples is filtered with weights that the other half tells
+//! Denoising by non-local means: each half of the samples is filtered with weights of the other half
 //! (shaders/lib/nl_means.glsl).
 //!
 //! Read Buades, Coll and Morel 2005, "A Non-Local Algorithm for Image Denoising"; Rousselle, Knaus and Zwicker 2012,
@@ -17,7 +17,7 @@ use crate::shader::{denoise, denoise_halves, denoise_variance};
 pub struct Denoising {
     /// Means of the two halves of the samples.
     means: [Image; 2],
-    /// The same as they are compared, and as alpha the variance: of the pixel, and of the pixels around it.
+    /// Their log radiance, and as alpha the variance: of the pixel, and the mean around it.
     guides: [Image; 2],
 }
 
@@ -51,16 +51,9 @@ pub fn denoise<'a>(
 ) -> Result<()> {
     let Denoising { means: [mean_a, mean_b], guides: [guide_a, guide_b] } = with;
     let size = [film.desc().width, film.desc().height];
-    let ([total_a, open_a, total_b, open_b], has) = images_of(sums, samples, block);
-    let bind = denoise_halves::Bind { total_a, open_a, total_b, open_b, mean_a, mean_b, guide_a, guide_b };
-    let push = denoise_halves::Push {
-        scale_a: 1.0 / samples[0] as f32,
-        scale_b: 1.0 / samples[1] as f32,
-        has_total_a: has[0],
-        has_open_a: has[1],
-        has_total_b: has[2],
-        has_open_b: has[3],
-    };
+    let (sample_sums, has) = images_of(sums, samples, block);
+    let bind = denoise_halves::Bind { sample_sums, mean_a, mean_b, guide_a, guide_b };
+    let push = denoise_halves::Push { scale_a: 1.0 / samples[0] as f32, scale_b: 1.0 / samples[1] as f32, has };
     frame.compute_over("halves of samples", &bind, &denoise_halves::Constants {}, &push, size)?;
     let bind = denoise_variance::Bind { guide_a, guide_b };
     frame.compute_over("variance of samples", &bind, &denoise_variance::Constants {}, &(), size)?;

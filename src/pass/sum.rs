@@ -12,6 +12,7 @@ use ash::vk;
 use super::accumulate::accumulate;
 use crate::gpu::{Device, Frame, Image, ImageDesc};
 use crate::shader::join;
+use crate::shader::lib::sample_sums::{self, HAS_OPEN_A, HAS_OPEN_B, HAS_TOTAL_A, HAS_TOTAL_B};
 
 /// Number of blocks of a picture's samples, when there are enough samples.
 pub const BLOCKS: u32 = 64;
@@ -108,13 +109,14 @@ impl Sum {
     }
 }
 
-/// The images of one or two sums after `samples` of each, total and open block, and whether each holds something; the
-/// shaders do not read those that do not.
-pub(super) fn images_of<'a>(sums: &'a [Sum], samples: &[u32], block: u32) -> ([&'a Image; 4], [u32; 4]) {
+/// The images of one or two sums after `samples` of each, and bits of those that hold something: shaders read no other.
+pub(super) fn images_of<'a>(sums: &'a [Sum], samples: &[u32], block: u32) -> (sample_sums::Bind<'a>, u32) {
     let images: Vec<Option<&Image>> = sums.iter().zip(samples).flat_map(|(sum, &of)| sum.images(of, block)).collect();
     let image = |i: usize| images.get(i).copied().flatten();
-    let all = [0, 1, 2, 3];
-    (all.map(|i| image(i).unwrap_or(&sums[0].total)), all.map(|i| u32::from(image(i).is_some())))
+    let at = |i: usize| image(i).unwrap_or(&sums[0].total);
+    let bits = [HAS_TOTAL_A, HAS_OPEN_A, HAS_TOTAL_B, HAS_OPEN_B];
+    let has = (0..).zip(bits).filter(|(i, _)| image(*i).is_some()).map(|(_, bit)| bit).sum();
+    (sample_sums::Bind { total_a: at(0), open_a: at(1), total_b: at(2), open_b: at(3) }, has)
 }
 
 /// Writes the mean of all samples of several sums into `film`; `samples` holds the number of samples of each sum.
@@ -122,10 +124,8 @@ pub(super) fn images_of<'a>(sums: &'a [Sum], samples: &[u32], block: u32) -> ([&
 /// # Errors
 /// When the driver refuses a descriptor or a layout.
 pub fn join<'a>(frame: &mut Frame<'a>, sums: &'a [Sum], samples: &[u32], block: u32, film: &'a Image) -> Result<()> {
-    let ([total_a, open_a, total_b, open_b], [has_total_a, has_open_a, has_total_b, has_open_b]) =
-        images_of(sums, samples, block);
-    let bind = join::Bind { total_a, open_a, total_b, open_b, film };
-    let scale = 1.0 / samples.iter().sum::<u32>() as f32;
-    let push = join::Push { scale, has_total_a, has_open_a, has_total_b, has_open_b };
+    let (sample_sums, has) = images_of(sums, samples, block);
+    let bind = join::Bind { sample_sums, film };
+    let push = join::Push { scale: 1.0 / samples.iter().sum::<u32>() as f32, has };
     frame.compute_over("join sums", &bind, &join::Constants {}, &push, [film.desc().width, film.desc().height])
 }

@@ -469,12 +469,12 @@ impl Planner<'_> {
         if kept { photons } else { 0 }
     }
 
-    /// Whether the picture is denoised: noise is told by the halves of the samples, independent in path tracing.
+    /// Whether the picture is denoised. Halves of the samples estimate its variance, independent in path tracing.
     fn denoising(&mut self, followed: bool) -> bool {
         let Self { decisions, knobs, .. } = self;
         let cause = match (followed, knobs.samples.count()) {
             (false, _) => Cause::against("path tracing is off"),
-            (_, 1) => Cause::against("one sample does not tell its noise"),
+            (_, 1) => Cause::against("one sample per pixel has no estimate of its variance"),
             _ => Cause::of("paths are drawn at random"),
         };
         let by_knob = knobs.denoise.choice().allows(knobs.denoise != Denoise::Off);

@@ -69,7 +69,11 @@ fn mistakes_end_in_one_sentence_and_no_file() {
         (vec!["scene.glb", "--set", "normals=f16"], 2, "it has oct16, oct24, oct32, f32"),
         (vec!["scene.glb", "--model", "global", "--set", "reflection=off"], 2, "contradicts indirect=path"),
         (vec!["scene.glb", "--set", "guiding=photons"], 2, "contradicts indirect=occlusion:16"),
-        (vec!["scene.glb", "--set", "denoise=nl-means"], 2, "contradicts indirect=occlusion:16: only paths tell"),
+        (
+            vec!["scene.glb", "--set", "denoise=nl-means"],
+            2,
+            "contradicts indirect=occlusion:16: only path tracing estimates",
+        ),
         (vec!["scene.glb", "--model", "local", "--max-error", "2%"], 2, "only paths tell their error"),
         (vec!["scene.glb", "--max-error", "0%"], 2, "expected a fraction above 0"),
         (vec!["scene.glb", "--model", "global", "--max-error", "none"], 2, "expected a fraction above 0"),

@@ -120,7 +120,7 @@ impl Knobs {
             )));
         } else if denoise != Denoise::Off {
             return Err(refused(format!(
-                "{denoise} contradicts {indirect}: only paths tell their noise; the nearest choice is indirect=path, or \
+                "{denoise} contradicts {indirect}: only path tracing estimates its variance; the nearest choice is indirect=path, or \
                  denoise=off"
             )));
         }
